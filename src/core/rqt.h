@@ -1,0 +1,436 @@
+/* rqt.h - the public header of librqt.a: terrain as restricted quadtrees.
+ *
+ * How to read this file: top to bottom, as a manual. A digital elevation model is a grid of *samples*.
+ * Its samples are the vertices of a *lattice*; right triangles that are halved again and again (a *bintree*)
+ * tile the lattice; a *closed* set of lattice vertices is the same thing as a crack-free mesh of such
+ * triangles. Each vertex gets an exact *error*; the mesh for a tolerance eps is "all vertices with an error
+ * above eps". Samples and errors are kept in square *blocks*, each of which stands alone: a *query* finds the
+ * one block that answers each place, and walks it.
+ *
+ * Rules of this library
+ *  - C11 and libc, libm, zstd. No file, no database, no printing, no global state that changes.
+ *  - Memory comes from the rqt_allocator that is passed in. What a function allocates, its ..._free releases.
+ *  - Functions that can fail return rqt_status; outputs are then left empty, so that ..._free is harmless.
+ *  - Heights are integers q in a unit of the terrain's own (rqt_unit); errors are codes (rqt_code), integers
+ *    whose order is the order of the errors. All decisions are made between integers.
+ *  - Coordinates: x grows east (columns), y grows south (rows), (0,0) is the north-west sample.
+ *
+ * Sources named below: [RQT] Pajarola, "Large scale terrain visualization using the restricted quadtree
+ * triangulation" (1998), for the lattice, Algorithms 1 and 2 and strips.
+ */
+#ifndef RQT_H
+#define RQT_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define RQT_VERSION "0.1.0"
+#define RQT_FORMAT_VERSION 1 /* of everything stored; FORMAT.md */
+
+typedef enum rqt_status {
+    RQT_OK = 0,
+    RQT_NO_MEMORY,    /* the allocator said no */
+    RQT_CORRUPT,      /* stored bytes are not what their format promises */
+    RQT_INVALID,      /* an argument is outside what the function accepts */
+    RQT_UNSUPPORTED,  /* understood, but not in this version */
+    RQT_READ_FAILED,  /* a callback of the caller failed; the caller knows why */
+    RQT_INTERRUPTED   /* a callback of the caller asked to stop */
+} rqt_status;
+
+/* A sentence about a failure, without trailing newline. Functions that take one fill it when they fail. */
+typedef struct rqt_message {
+    char text[256];
+} rqt_message;
+
+/* realloc in one function: p NULL allocates, bytes 0 releases (and returns NULL), otherwise resizes.
+ * Returns NULL when there is no memory; p then stays valid. */
+typedef struct rqt_allocator {
+    void *(*resize)(void *context, void *p, size_t bytes);
+    void *context;
+} rqt_allocator;
+
+/* ------------------------------------------------------------------------------------------- lattice --
+ * The root square has 2^K + 1 vertices a side, the smallest that holds the raster, anchored at sample (0,0).
+ * Lattice vertex (x,y) IS the sample (min(x,width-1), min(y,height-1)): topology lives on the lattice,
+ * geometry is clamped to the raster. A triangle of zero area then lies on the last column or row, and is
+ * dropped. */
+#define RQT_MAX_K 20 /* a side of 1,048,577 samples: more than any national 1 m grid is wide */
+
+typedef struct rqt_vertex {
+    int32_t x, y;
+} rqt_vertex;
+
+typedef struct rqt_lattice {
+    int32_t width, height; /* samples, each 1 .. 2^RQT_MAX_K + 1 */
+    int K;                 /* 0 .. RQT_MAX_K */
+} rqt_lattice;
+
+/* A triangle of the bintree: right angle at the apex, hypotenuse from left to right. Its split vertex is the
+ * midpoint of the hypotenuse. */
+typedef struct rqt_triangle {
+    rqt_vertex apex, left, right;
+} rqt_triangle;
+
+/* RQT_INVALID when a side is less than 1 or more than 2^RQT_MAX_K + 1. */
+rqt_status rqt_lattice_init(rqt_lattice *lattice, int64_t width, int64_t height);
+
+/* log2 of the largest power of two that divides both coordinates; K for the four corners. */
+int rqt_vertex_scale(const rqt_lattice *lattice, rqt_vertex v);
+/* The level of a vertex: 0 for the corners, K for the finest ([RQT] section 3). */
+int rqt_vertex_level(const rqt_lattice *lattice, rqt_vertex v);
+/* The vertices that v depends on, at most two; returns their number: 0 for corners, 1 for a midpoint of the
+ * root's border, 2 otherwise. */
+int rqt_vertex_parents(const rqt_lattice *lattice, rqt_vertex v, rqt_vertex parents[2]);
+/* The vertices that depend on v, at most four; returns their number. */
+int rqt_vertex_children(const rqt_lattice *lattice, rqt_vertex v, rqt_vertex children[4]);
+/* The sample that a lattice vertex stands for. */
+rqt_vertex rqt_vertex_clamp(const rqt_lattice *lattice, rqt_vertex v);
+
+/* ----------------------------------------------------------------------------------- units and codes --
+ * Metres of a height q: ((double)z0 + q / (double)d) * f + o, with f = scale * numerator / denominator.
+ * One double expression, evaluated in that order, never fused. */
+typedef struct rqt_unit {
+    int64_t z0;                     /* |z0| < 2^53 */
+    int32_t d;                      /* quanta in one unit, 1 .. 2^20 */
+    int32_t numerator, denominator; /* the unit in metres where it is a named one: 1/1, 381/1250, 1200/3937 */
+    double scale;                   /* finite, not 0: band scale times the unit where that is a plain number */
+    double offset;                  /* metres, finite */
+} rqt_unit;
+
+#define RQT_HEIGHT_LIMIT (1 << 30) /* |q| < this */
+
+bool rqt_unit_is_valid(const rqt_unit *unit);
+double rqt_unit_factor(const rqt_unit *unit); /* f */
+double rqt_unit_metres(const rqt_unit *unit, int32_t q);
+
+/* An error as a small float of 8 significant bits in 16: code 0 is 0, code c > 0 is
+ * (128 + (c & 127)) * 2^((c >> 7) - 263), 65535 is infinity. So every tolerance of at most 8 significant bits
+ * (0.5, 5, 20, 100 ...) is a code itself, and selects exactly what real-valued errors would select. */
+typedef uint16_t rqt_code;
+#define RQT_CODE_INFINITY ((rqt_code)0xFFFF)
+#define RQT_CODE_LARGEST ((rqt_code)0xFFFE) /* the largest finite code */
+
+/* The value of a code, exactly; +infinity for RQT_CODE_INFINITY. */
+double rqt_code_metres(rqt_code code);
+/* The smallest code that is not below numerator/denominator height quanta, in metres: compared as exact
+ * rationals, whatever the unit. Values above the largest finite code give it (errors beyond 2^255 m do not
+ * occur: |q| < 2^30). denominator is 1 .. 2^42. */
+rqt_code rqt_code_from_quanta(const rqt_unit *unit, uint64_t numerator_high, uint64_t numerator_low,
+                              uint64_t denominator);
+/* The smallest code that is not below extent*cell/c, exactly: what a void outline costs. extent >= 0 samples,
+ * cell and c finite and > 0. */
+rqt_code rqt_code_from_ground(int64_t extent, double cell, double c);
+/* The largest code that is not above metres (metres >= 0; infinity gives RQT_CODE_LARGEST). */
+rqt_code rqt_code_floor(double metres);
+/* The code every comparison is made with: the largest code <= max(0, eps - quantum_error), the difference
+ * rounded down. eps must not be NaN or negative. */
+rqt_code rqt_code_eps(double eps, double quantum_error);
+
+/* -------------------------------------------------------------------------------------- exact errors --
+ * The error of a vertex P is the largest deviation, over ALL valid samples in the at most two closed clamped
+ * triangles whose split vertex is P, of the sample from the triangle's plane: ALGORITHMS in src/README.md.
+ * A triangle that holds valid and void samples is *mixed*: it counts as
+ *     max(deviation of its valid samples if its three corners are valid, else 0; extent * cell / c)
+ * where extent is the longer side of the clamped triangle's box in samples, and P gets the outline bit x. */
+typedef struct rqt_grid {
+    rqt_lattice lattice;
+    const int32_t *q;     /* width * height, row by row; the value where a sample is void does not matter */
+    const uint8_t *valid; /* width * height, 0 or 1; NULL when every sample is valid */
+} rqt_grid;
+
+typedef struct rqt_void_cost {
+    double cell; /* metres of ground that one sample step stands for */
+    double c;    /* metres of outline that may be lost per metre of eps (--void-tol) */
+} rqt_void_cost;
+
+/* Errors of every lattice vertex that a block can ask for. Vertices past the raster's last sample sit in a few
+ * extra columns and rows; only rqt_errors_at knows where. */
+typedef struct rqt_errors {
+    rqt_lattice lattice;
+    int32_t columns, rows; /* of the arrays: samples plus extras */
+    rqt_code *code;        /* columns * rows */
+    uint8_t *outline;      /* columns * rows, 0 or 1: the bit x */
+    bool any_outline;
+} rqt_errors;
+
+/* Bytes that rqt_errors_compute allocates, for a memory plan. */
+size_t rqt_errors_bytes(const rqt_lattice *lattice);
+/* e(P) and x(P) as defined above, raw: not yet propagated to ancestors. O(n log n).
+ * progress, when not NULL, is called with the share done, and stops the work when it returns false. */
+rqt_status rqt_errors_compute(const rqt_grid *grid, const rqt_unit *unit, const rqt_void_cost *cost,
+                              const rqt_allocator *allocator, bool (*progress)(void *context, double done),
+                              void *context, rqt_errors *errors);
+/* e_sat and the saturated x, in place: each vertex gets the maximum over itself and all its descendants;
+ * the four corners get RQT_CODE_INFINITY. O(n). */
+void rqt_errors_saturate(rqt_errors *errors);
+/* The code and bit of a lattice vertex, 0 <= x,y <= 2^K. */
+rqt_code rqt_errors_at(const rqt_errors *errors, rqt_vertex v, bool *outline);
+void rqt_errors_free(rqt_errors *errors, const rqt_allocator *allocator);
+
+/* ----------------------------------------------------------------------------------------- selection --
+ * A set of lattice vertices. Closed sets are exactly the crack-free meshes: with its four corners (always in,
+ * never stored) and every parent of every member. */
+typedef struct rqt_selection rqt_selection;
+
+rqt_status rqt_selection_create(const rqt_lattice *lattice, const rqt_allocator *allocator,
+                                rqt_selection **selection);
+void rqt_selection_free(rqt_selection *selection);
+bool rqt_selection_has(const rqt_selection *selection, rqt_vertex v);
+size_t rqt_selection_count(const rqt_selection *selection); /* without the corners */
+/* Insert v and, transitively, everything it depends on ([RQT] Algorithm 1, ResolveDependencies). */
+rqt_status rqt_selection_add_resolved(rqt_selection *selection, rqt_vertex v);
+/* Insert n vertices and close the set, one pass from the finest level to the coarsest, sides before centres
+ * within a level ([RQT] Algorithm 2). Vertices already in the selection must be closed. */
+rqt_status rqt_selection_add_bottom_up(rqt_selection *selection, const rqt_vertex *vertices, size_t n);
+/* Algorithms 1 and 2 over a whole terrain: everything with error > eps or the outline bit, closed. They work
+ * from raw errors and from saturated ones, and give the same set. */
+rqt_status rqt_select_top_down(const rqt_errors *errors, rqt_code eps, rqt_selection *selection);
+rqt_status rqt_select_bottom_up(const rqt_errors *errors, rqt_code eps, rqt_selection *selection);
+
+/* -------------------------------------------------------------------------------------------- blocks --
+ * The block of level l at cell (i,j) covers the square of side 2^(K-l) at (i,j)*2^(K-l) with (2^k + 1)^2
+ * vertices, neighbours 2^(K-l-k) samples apart (its stride). Levels run from 0, the root, to K-k, stride 1.
+ * A block exists iff its north-west corner is before the last column and the last row (in a raster of one
+ * column or row: iff it is the first). */
+#define RQT_MAX_BLOCK_K 8
+
+/* Number of a block: 4^level + the Morton code of (i,j), x in the even bits. Never 0; sorted by level. */
+typedef uint64_t rqt_block_number;
+
+typedef struct rqt_block_place {
+    int level;
+    int32_t i, j;      /* cell */
+    int32_t x, y;      /* north-west corner, samples */
+    int32_t side;      /* samples; x+side and y+side may lie past the raster */
+    int32_t stride;    /* samples between neighbours of its grid */
+    int32_t width, height; /* vertices of its grid that are not past the last sample, 1 .. 2^k + 1 */
+} rqt_block_place;
+
+rqt_block_number rqt_block_number_of(int level, int32_t i, int32_t j);
+/* RQT_INVALID when the terrain (lattice and k, 0 <= k <= min(RQT_MAX_BLOCK_K, K)) has no such block. */
+rqt_status rqt_block_locate(const rqt_lattice *lattice, int k, rqt_block_number number, rqt_block_place *place);
+/* How many levels of blocks there are: K - k + 1. */
+int rqt_block_levels(const rqt_lattice *lattice, int k);
+
+#define RQT_VALID 1   /* flag: the sample has data */
+#define RQT_OUTLINE 2 /* flag: the bit x of the vertex */
+
+/* A decoded block: three arrays of (2^k + 1)^2, row by row. Vertices past the last sample repeat its height
+ * and validity, as the lattice does, and have errors and outline bits of their own. */
+typedef struct rqt_block {
+    int k;
+    int32_t width, height; /* as in rqt_block_place: what is stored of heights and validity */
+    int32_t *q;
+    rqt_code *error; /* saturated */
+    uint8_t *flags;  /* RQT_VALID | RQT_OUTLINE */
+} rqt_block;
+
+rqt_status rqt_block_create(int k, const rqt_allocator *allocator, rqt_block *block);
+void rqt_block_free(rqt_block *block, const rqt_allocator *allocator);
+/* Bytes of memory that a decoded block of this k takes. */
+size_t rqt_block_bytes(int k);
+
+/* A compressor or decompressor with its buffers, for one thread. Knows the largest block it can meet. */
+typedef struct rqt_codec rqt_codec;
+rqt_status rqt_codec_create(const rqt_allocator *allocator, rqt_codec **codec);
+void rqt_codec_free(rqt_codec *codec);
+
+/* The most bytes that an encoded block of this k can take. */
+size_t rqt_block_bound(int k);
+/* block -> bytes (FORMAT.md, "Block"). quantum is the metres of one height quantum, |f|/d, used to predict
+ * errors from heights. bytes has room for rqt_block_bound(block->k). Equal blocks give equal bytes. */
+rqt_status rqt_block_encode(rqt_codec *codec, const rqt_block *block, double quantum, uint8_t *bytes,
+                            size_t *size);
+/* bytes -> block, which was created with the k that rqt_block_info tells. Trusts nothing: any input gives
+ * RQT_OK or RQT_CORRUPT, without reading past size. */
+rqt_status rqt_block_decode(rqt_codec *codec, const uint8_t *bytes, size_t size, rqt_block *block);
+
+typedef struct rqt_block_header {
+    int version, k;
+    int32_t width, height; /* stored heights */
+    bool has_voids, all_void, has_outline;
+    int height_planes, error_planes; /* bytes per residual */
+    double quantum;
+    size_t payload; /* bytes after decompression */
+} rqt_block_header;
+
+/* Header only, checked against size; the checksum is not computed. */
+rqt_status rqt_block_info(const uint8_t *bytes, size_t size, rqt_block_header *header, rqt_message *message);
+/* Full validation: decodes, and says what is wrong. */
+rqt_status rqt_block_check(rqt_codec *codec, const uint8_t *bytes, size_t size, rqt_message *message);
+
+/* What a query must know of a block before (and often instead of) reading it: FORMAT.md, "Block summary".
+ * corner: north-west, north-east, south-west, south-east. far: the two vertices outside the block that complete
+ * the parent's quarters; far[n] = 2*A - c, A the block's corner on the parent's border that is far_apex(n), c the
+ * corner opposite the parent's centre. n = 0: A differs from c in x; n = 1: A differs from c in y. Unused, all
+ * zero, at level 0. Positions are lattice positions, values those of the clamped sample. */
+typedef struct rqt_summary_vertex {
+    int32_t q;
+    rqt_code error;
+    uint8_t flags;
+} rqt_summary_vertex;
+
+/* The errors finer than the block's stride lie in an interval: the block answers eps iff em <= eps < em_parent.
+ * One interval for the outline `tol`, one for `exact`, where an outline bit below counts as infinite. */
+typedef struct rqt_interval {
+    rqt_code em, em_parent;
+} rqt_interval;
+
+typedef struct rqt_summary {
+    rqt_interval tol, exact;
+    rqt_code center_error; /* 0 when k = 0: such a block has no centre */
+    uint8_t center_flags;
+    rqt_summary_vertex corner[4];
+    rqt_summary_vertex far[2];
+} rqt_summary;
+
+#define RQT_SUMMARY_BYTES 80
+void rqt_summary_encode(const rqt_summary *summary, uint8_t bytes[RQT_SUMMARY_BYTES]);
+rqt_status rqt_summary_decode(const uint8_t *bytes, size_t size, rqt_summary *summary);
+
+/* The whole pyramid of one terrain from its samples and saturated errors, for the store to write. */
+typedef struct rqt_pyramid rqt_pyramid;
+/* grid and errors must outlive the pyramid. k as in rqt_block_locate. */
+rqt_status rqt_pyramid_create(const rqt_grid *grid, const rqt_errors *saturated, int k,
+                              const rqt_allocator *allocator, rqt_pyramid **pyramid);
+void rqt_pyramid_free(rqt_pyramid *pyramid);
+size_t rqt_pyramid_count(const rqt_pyramid *pyramid); /* blocks of all levels */
+/* Block number n (0 .. count-1), in ascending order of block number. block may be NULL when only the summary is
+ * wanted. Thread-safe: changes nothing. */
+void rqt_pyramid_block(const rqt_pyramid *pyramid, size_t n, rqt_block_number *number, rqt_summary *summary,
+                       rqt_block *block);
+
+/* ------------------------------------------------------------------------------------------- regions --
+ * A geometry as it came (WKT or EWKT text, GeoPackage or SpatiaLite bytes), in its own coordinates; and a
+ * region: the same in sample coordinates, each rounded to the nearest 2^-20 sample, exact integers after that.
+ * Interiors of polygons follow the even-odd rule over all rings, whatever their order or direction; a
+ * multipolygon or a collection is the union of its members. */
+typedef struct rqt_geometry rqt_geometry;
+typedef struct rqt_region rqt_region;
+
+/* text: n characters of WKT or EWKT; else n bytes of a GeoPackage or SpatiaLite geometry. Z and M are read and
+ * ignored. RQT_INVALID with a sentence for anything unreadable, not finite, or empty where it must not be;
+ * RQT_UNSUPPORTED for curves and surfaces. An EMPTY geometry is valid and meets nothing. */
+rqt_status rqt_geometry_parse(const void *bytes, size_t n, bool text, const rqt_allocator *allocator,
+                              rqt_geometry **geometry, rqt_message *message);
+void rqt_geometry_free(rqt_geometry *geometry);
+/* 0 when the geometry names none (GeoPackage's 0 and -1 count as none). */
+int32_t rqt_geometry_srid(const rqt_geometry *geometry);
+
+/* Where the samples of a terrain lie: sample (col,row) is at (x0 + col*dx, y0 + row*dy). dx, dy finite, not 0. */
+typedef struct rqt_placement {
+    double x0, y0, dx, dy;
+} rqt_placement;
+
+/* geometry NULL: everything. Coordinates further than 2^40 samples from the terrain are taken as that far. */
+rqt_status rqt_region_create(const rqt_geometry *geometry, const rqt_placement *placement,
+                             const rqt_lattice *lattice, const rqt_allocator *allocator, rqt_region **region);
+void rqt_region_free(rqt_region *region);
+bool rqt_region_is_all(const rqt_region *region);
+bool rqt_region_is_empty(const rqt_region *region);
+/* The region's box grown outward to whole samples and clamped to the raster. false when it misses the raster. */
+bool rqt_region_box(const rqt_region *region, int32_t *x0, int32_t *y0, int32_t *x1, int32_t *y1);
+
+typedef enum rqt_relation {
+    RQT_OUTSIDE, /* no triangle within the box belongs to the region */
+    RQT_INSIDE,  /* every triangle with an area within the box does */
+    RQT_ACROSS   /* ask for the triangle */
+} rqt_relation;
+
+/* How the closed box of samples [x0,x1] x [y0,y1] lies to the region. May answer RQT_ACROSS where a closer look
+ * would tell more, never the other way. */
+rqt_relation rqt_region_box_relation(const rqt_region *region, int32_t x0, int32_t y0, int32_t x1, int32_t y1);
+/* Mode `cover`: does the triangle (sample coordinates, any winding, with an area) belong to the region? For a
+ * member with an area: interior meets interior. For lines and points, and polygons that the rounding collapsed:
+ * the closed triangle meets it. Exact. */
+bool rqt_region_meets(const rqt_region *region, rqt_vertex a, rqt_vertex b, rqt_vertex c);
+/* Is the sample in the interior of a member with an area? */
+bool rqt_region_contains(const rqt_region *region, rqt_vertex sample);
+
+/* ----------------------------------------------------------------------------------- query and patch --
+ * The mesh that answers a query. Vertices are samples, each once, in the order of the walk. */
+typedef struct rqt_patch_vertex {
+    int32_t col, row;
+    int32_t q;
+    rqt_code error; /* the largest among the lattice vertices that are this sample and in the patch */
+    uint8_t level;  /* the smallest among them */
+} rqt_patch_vertex;
+
+typedef struct rqt_patch {
+    rqt_patch_vertex *vertices;
+    size_t vertex_count;
+    uint32_t *triangles; /* 3 * triangle_count indices, counter-clockwise seen from above, in the order of the walk */
+    size_t triangle_count;
+    rqt_allocator allocator;
+} rqt_patch;
+
+void rqt_patch_free(rqt_patch *patch);
+
+typedef enum rqt_select { RQT_SELECT_THRESHOLD, RQT_SELECT_TOP_DOWN, RQT_SELECT_BOTTOM_UP } rqt_select;
+typedef enum rqt_outline { RQT_OUTLINE_EXACT, RQT_OUTLINE_TOL } rqt_outline;
+
+typedef struct rqt_answer { /* a block of the index that answers eps and whose extent meets the region's box */
+    rqt_block_number number;
+    rqt_summary summary;
+} rqt_answer;
+
+typedef struct rqt_query {
+    rqt_lattice lattice;
+    int k;
+    const rqt_region *region;
+    rqt_code eps;
+    rqt_select select;
+    rqt_outline outline;
+    rqt_answer *answers; /* in any order; sorted into Morton order by the query */
+    size_t answer_count;
+    /* The decoded block of a number, valid until the next call. NULL: the query stops with RQT_READ_FAILED. */
+    const rqt_block *(*read_block)(void *context, rqt_block_number number);
+    bool (*is_interrupted)(void *context); /* may be NULL; asked once per block */
+    void *context;
+} rqt_query;
+
+/* Does a block with this summary answer eps? */
+bool rqt_summary_answers(const rqt_summary *summary, rqt_outline outline, rqt_code eps);
+/* Does the query need this block's bytes, or is its summary enough? */
+bool rqt_summary_needs_block(const rqt_summary *summary, int level, rqt_outline outline, rqt_code eps);
+/* The patch of a query (mode `cover`): each kept leaf that belongs to the region, once. */
+rqt_status rqt_query_run(rqt_query *query, const rqt_allocator *allocator, rqt_patch *patch);
+
+/* One generalized strip of a patch: n indices; triangle i is (s[i], s[i+1], s[i+2]), its last two swapped for odd
+ * i, counter-clockwise; a triangle with two equal vertices is a join. An empty patch gives n = 0.
+ * Release with allocator->resize(context, strip, 0). */
+rqt_status rqt_strip_build(const rqt_patch *patch, const rqt_allocator *allocator, uint32_t **strip, size_t *n);
+
+/* --------------------------------------------------------------------------------------- mesh formats --
+ * The formats of our own that stand alone (FORMAT.md, "Mesh"): 'strip' and 'indexed'. */
+typedef enum rqt_mesh_kind { RQT_MESH_STRIP = 1, RQT_MESH_INDEXED = 2 } rqt_mesh_kind;
+
+typedef struct rqt_mesh_header {
+    rqt_mesh_kind kind;
+    uint64_t vertex_count, index_count;
+    rqt_placement placement;
+    rqt_unit unit;
+    double eps;
+    int32_t srid;
+} rqt_mesh_header;
+
+#define RQT_MESH_HEADER_BYTES 128
+/* Bytes of the encoded mesh: header, 12 per vertex, 4 per index. */
+size_t rqt_mesh_bytes(const rqt_mesh_header *header);
+/* indices: the strip's, or 3 per triangle. bytes has room for rqt_mesh_bytes(header). */
+void rqt_mesh_encode(const rqt_mesh_header *header, const rqt_patch_vertex *vertices, const uint32_t *indices,
+                     uint8_t *bytes);
+/* Checks everything, indices included. vertices and indices point into bytes: int32 col,row,q and uint32. They
+ * may be unaligned: copy before use. */
+rqt_status rqt_mesh_decode(const uint8_t *bytes, size_t size, rqt_mesh_header *header, const uint8_t **vertices,
+                           const uint8_t **indices);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
