@@ -1,0 +1,72 @@
+/* internal.h - what the files of the core share and nobody else sees: memory, byte order, checksum, sentences. */
+#ifndef RQT_INTERNAL_H
+#define RQT_INTERNAL_H
+
+#include "rqt.h"
+
+#include <string.h>
+
+static inline void *memory_take(const rqt_allocator *a, size_t bytes) {
+    return a->resize(a->context, NULL, bytes ? bytes : 1);
+}
+static inline void memory_drop(const rqt_allocator *a, void *p) {
+    if (p) (void)a->resize(a->context, p, 0);
+}
+/* Grow an array to hold at least `need` elements of `size` bytes; doubles. False: no memory, nothing changed. */
+static inline bool memory_grow(const rqt_allocator *a, void **array, size_t *capacity, size_t need, size_t size) {
+    if (need <= *capacity) return true;
+    size_t wanted = *capacity ? *capacity : 64;
+    while (wanted < need) {
+        if (wanted > SIZE_MAX / 2) return false;
+        wanted *= 2;
+    }
+    if (wanted > SIZE_MAX / size) return false;
+    void *p = a->resize(a->context, *array, wanted * size);
+    if (!p) return false;
+    *array = p;
+    *capacity = wanted;
+    return true;
+}
+
+/* Little-endian bytes; the only place that knows the byte order. */
+static inline void put16(uint8_t *p, uint16_t v) {
+    p[0] = (uint8_t)v;
+    p[1] = (uint8_t)(v >> 8);
+}
+static inline void put32(uint8_t *p, uint32_t v) {
+    put16(p, (uint16_t)v);
+    put16(p + 2, (uint16_t)(v >> 16));
+}
+static inline void put64(uint8_t *p, uint64_t v) {
+    put32(p, (uint32_t)v);
+    put32(p + 4, (uint32_t)(v >> 32));
+}
+static inline void put_double(uint8_t *p, double v) {
+    uint64_t bits;
+    memcpy(&bits, &v, 8);
+    put64(p, bits);
+}
+static inline uint16_t get16(const uint8_t *p) { return (uint16_t)(p[0] | p[1] << 8); }
+static inline uint32_t get32(const uint8_t *p) { return (uint32_t)get16(p) | (uint32_t)get16(p + 2) << 16; }
+static inline uint64_t get64(const uint8_t *p) { return (uint64_t)get32(p) | (uint64_t)get32(p + 4) << 32; }
+static inline double get_double(const uint8_t *p) {
+    uint64_t bits = get64(p);
+    double v;
+    memcpy(&v, &bits, 8);
+    return v;
+}
+
+/* FORMAT.md, "Checksum", with the 8 bytes at `field` taken as zero (field is a multiple of 8). checksum.c */
+uint64_t checksum64(const uint8_t *bytes, size_t size, size_t field);
+
+/* Put a sentence together; cuts what does not fit. message may be NULL. sentence.c */
+void sentence_begin(rqt_message *message, const char *text);
+void sentence_add(rqt_message *message, const char *text);
+void sentence_add_integer(rqt_message *message, int64_t value);
+
+/* Where column x (0 .. 2^K) of the lattice sits in the arrays of rqt_errors; -1 when it is past the last sample and no
+ * error can reach it. lattice.c */
+int32_t lattice_slot(int32_t x, int32_t samples);
+int32_t lattice_slots(const rqt_lattice *lattice, int32_t samples); /* how many there are */
+
+#endif

@@ -1,0 +1,131 @@
+/* store.h - terrains and blocks in an SQLite database.
+ *
+ * Reading: one `store` per connection finds terrains by name, answers queries from the index and a cache of decoded
+ * blocks, and never writes. Writing: a `store_writer` adds one terrain inside one transaction.
+ *
+ * The query side needs two things of an engine only: "the blocks of this terrain that meet this box and answer this
+ * eps" (reader.c, answers) and "the bytes of block n" (reader.c, read_block). Nothing else here knows SQL.
+ *
+ * Results are SQLite's codes. With anything but SQLITE_OK, *error may hold a sentence, to be released with sqlite3_free;
+ * without a sentence sqlite3_errstr(code) is the sentence (out of memory, interrupted).
+ */
+#ifndef RQT_STORE_H
+#define RQT_STORE_H
+
+#include "rqt.h"
+#include "sqlite.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* SQLite's memory as the core's. Static life. */
+const rqt_allocator *store_allocator(void);
+
+typedef struct store_terrain {
+    int64_t id;    /* N of rqt_block_N, rqt_index_N */
+    char name[64]; /* [A-Za-z0-9_.-]{1,63} */
+    char schema[64]; /* of the connection: "main" or an attached database's name */
+    bool complete;   /* false: an import did not finish; queries refuse it */
+    rqt_lattice lattice;
+    int k;
+    rqt_placement placement;
+    rqt_unit unit;
+    double quantum_error; /* metres: half a quantum where float heights were rounded, else 0 */
+    rqt_void_cost cost;
+    int32_t srid;     /* 0: none known */
+    bool lonlat;      /* coordinates are degrees of longitude and latitude */
+    bool wgs84;       /* ... on WGS 84, whatever the SRID says: what EPSG:4326 regions meet */
+    char *crs;        /* WKT, "" for none */
+    char *vertical;   /* vertical datum as the source names it, "" for none */
+    char *source;     /* where it came from: file names, one a line */
+    char *created;    /* ISO 8601, UTC */
+    int64_t voids;    /* void samples */
+    int32_t min_q, max_q; /* of the valid samples; both 0 when there are none */
+    int64_t blocks, bytes; /* of the block table: rows, and bytes of BLOBs and summaries */
+    rqt_code max_error;    /* the largest finite error of any vertex */
+} store_terrain;
+
+/* ---------------------------------------------------------------------------------------------- reading */
+typedef struct store store;
+
+int store_open(sqlite3 *db, store **out);
+/* Finalise the statements that it keeps, so that the connection can close; they are prepared again when needed. */
+void store_release(store *s);
+void store_close(store *s);
+
+/* The terrain of this name ("schema.name" reaches into attached databases); NULL: the only one of all. SQLITE_ERROR
+ * with a sentence that lists what there is when it is unknown, ambiguous or incomplete. Valid until the next call of
+ * store_find on this store. */
+int store_find(store *s, const char *name, const store_terrain **terrain, char **error);
+/* All terrains, incomplete ones too, by schema and name. *count entries; release with store_terrains_free. */
+int store_terrains(store *s, store_terrain **terrains, int *count, char **error);
+void store_terrains_free(store_terrain *terrains, int count);
+
+typedef struct store_query_options {
+    rqt_select select;
+    rqt_outline outline;
+} store_query_options;
+
+/* One row per block that answered, in Morton order. */
+typedef struct store_read {
+    rqt_block_number number;
+    bool needs_bytes; /* false: answered from its index row alone */
+    bool cached;      /* its decoded bytes were in the cache */
+    int64_t bytes;    /* of the BLOB, read now or before; 0 when not needed */
+    int64_t selected; /* vertices of its grid that eps selects, corners of the block included */
+} store_read;
+typedef struct store_reads {
+    store_read *rows;
+    size_t count;
+} store_reads;
+void store_reads_free(store_reads *reads);
+
+/* The patch of region at eps (metres; checked here: NaN and negative are SQLITE_ERROR). reads may be NULL. */
+int store_query(store *s, const store_terrain *t, const rqt_region *region, double eps,
+                const store_query_options *options, rqt_patch *patch, store_reads *reads, char **error);
+/* Full-resolution samples of a window inside the raster, for width*height values each, row by row. */
+int store_window(store *s, const store_terrain *t, int32_t col, int32_t row, int32_t width, int32_t height, int32_t *q,
+                 uint8_t *valid, char **error);
+/* Height in metres at CRS coordinates on the mesh of eps (eps < 0: full resolution). *found = false over void or
+ * outside. */
+int store_height(store *s, const store_terrain *t, double x, double y, double eps, double *metres, bool *found,
+                 char **error);
+
+/* How far check has come, and what it found: severity "error" or "warning", block 0 when it is not about one. */
+typedef struct store_finding {
+    const char *severity;
+    rqt_block_number block;
+    const char *message;
+} store_finding;
+/* Everything that can be checked without the source: see check.c. tell returns false to stop. */
+int store_check(store *s, const store_terrain *t, bool (*tell)(void *context, const store_finding *finding), void *context,
+                char **error);
+
+/* ---------------------------------------------------------------------------------------------- writing */
+typedef enum store_kind { STORE_GEOPACKAGE, STORE_PLAIN } store_kind;
+
+/* Create what a new, empty database needs: a GeoPackage (application id, core tables). Harmless on one that is a
+ * GeoPackage already; leaves every other database as it is. Inside the caller's transaction. */
+int store_make_geopackage(sqlite3 *db, char **error);
+
+typedef struct store_writer store_writer;
+/* Begin one terrain, inside a transaction that the caller has begun (BEGIN IMMEDIATE) and will commit or roll back.
+ * info: all fields but id, schema, blocks, bytes, max_error, complete. An existing terrain of the name is
+ * an error unless replace. In a GeoPackage the tables are registered as attributes. */
+int store_writer_begin(sqlite3 *db, const store_terrain *info, bool replace, store_writer **writer, char **error);
+/* One block, in ascending order of number. */
+int store_writer_block(store_writer *w, rqt_block_number number, const rqt_summary *summary, const uint8_t *bytes,
+                       size_t size, char **error);
+/* Mark the terrain complete. */
+int store_writer_finish(store_writer *w, rqt_code max_error, char **error);
+/* Release, finished or not. */
+void store_writer_free(store_writer *w);
+
+/* Is this a name a terrain may have? */
+bool store_name_is_valid(const char *name);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
