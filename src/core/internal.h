@@ -64,6 +64,25 @@ void sentence_begin(rqt_message *message, const char *text);
 void sentence_add(rqt_message *message, const char *text);
 void sentence_add_integer(rqt_message *message, int64_t value);
 
+/* The smallest code not below a double, taken at its word (0 for anything not above 0). code.c */
+rqt_code code_above(double metres);
+
+/* Codes of many errors of one terrain: numerator / 2^shift quanta, exactly as rqt_code_from_quanta, in the common case
+ * with one multiplication. shift 0 .. 42. code.c */
+typedef struct code_scale {
+    rqt_unit unit;
+    double factor; /* metres per quantum, as near as a double comes */
+    bool exact;    /* it is a power of two */
+} code_scale;
+void code_scale_init(code_scale *scale, const rqt_unit *unit);
+rqt_code code_of_binary(const code_scale *scale, uint64_t numerator, int shift);
+
+static inline double bits_double(uint64_t bits) {
+    double v;
+    memcpy(&v, &bits, 8);
+    return v;
+}
+
 /* Where column x (0 .. 2^K) of the lattice sits in the arrays of rqt_errors; -1 when it is past the last sample and no
  * error can reach it. lattice.c */
 int32_t lattice_slot(int32_t x, int32_t samples);

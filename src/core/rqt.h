@@ -208,7 +208,8 @@ typedef struct rqt_block_place {
     int32_t x, y;      /* north-west corner, samples */
     int32_t side;      /* samples; x+side and y+side may lie past the raster */
     int32_t stride;    /* samples between neighbours of its grid */
-    int32_t width, height; /* vertices of its grid that are not past the last sample, 1 .. 2^k + 1 */
+    int32_t width, height; /* vertices of its grid up to the first that is at or past the last sample, 1 .. 2^k + 1;
+                              the ones after it are the same sample again */
 } rqt_block_place;
 
 rqt_block_number rqt_block_number_of(int level, int32_t i, int32_t j);

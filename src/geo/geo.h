@@ -5,10 +5,22 @@
 extern "C" {
 #endif
 
-/* Points of a geodesic circle on WGS 84: n pairs lon,lat (degrees), counter-clockwise seen from above, the first not
- * repeated at the end. Longitudes are continuous: they may leave [-180,180] rather than jump, centred on lon's own turn.
- * radius in metres, > 0, at most a quarter of the meridian short of either pole (a circle around a pole is no ring in
- * lon/lat). Returns 0, or 1 and a sentence in message when the arguments do not make such a circle. */
+#define GEO_CIRCLE_POINTS 1000000 /* the most points that a circle may have */
+
+/* Points of a geodesic circle on WGS 84: n pairs lon,lat in degrees, each at the geodesic distance radius (metres)
+ * from (lon,lat). Counter-clockwise seen from above, beginning in the east; the first point is not repeated at the
+ * end.
+ *
+ * Longitudes are continuous: a circle that crosses the antimeridian leaves [-180,180] rather than jump. All of them
+ * are less than 180 degrees from lon, on the turn that lon was given on: around lon 179 they run past 180, around
+ * lon -181 they lie about -181.
+ *
+ * A circle that reaches or encloses a pole is no ring in lon,lat and is refused; so the largest radius is the
+ * distance to the nearer pole: 10002 km on the equator, 112 km at lat 89, none at lat 90. A circle below a
+ * millimetre is finer than longitudes in double, and is refused too.
+ *
+ * lon is -360 .. 360, lat -90 .. 90, n 3 .. GEO_CIRCLE_POINTS. Returns 0; or 1, with a sentence (no newline, cut to
+ * message_size; message may be NULL) and lonlat unspecified, when the arguments do not make such a circle. */
 int geo_circle(double lon, double lat, double radius, int n, double *lonlat, char *message, int message_size);
 
 /* GeographicLib's version, as text of static life. */

@@ -1,9 +1,9 @@
 /* verify.h - the independent verifier: samples + triangles -> error, cracks, cover.
  *
- * It knows nothing of quadtrees, errors, selections or blocks, and shares no header with the code that makes meshes:
- * it takes a list of triangles in sample coordinates as the caller was given them, and the full-resolution samples, and
- * works out from these alone what is true of the mesh. Exact: integers, 128 bits where needed. Memory through malloc;
- * the library is linked into an extension, so it prints nothing and never exits.
+ * It knows nothing of quadtrees, errors, selections or blocks, and shares no header with the code that makes
+ * meshes: it takes a list of triangles in sample coordinates as the caller was given them, and the full-resolution
+ * samples, and works out from these alone what is true of the mesh. Exact: integers, 128 bits where needed. Memory
+ * through malloc; the library is linked into an extension, so it prints nothing and never exits.
  */
 #ifndef RQT_VERIFY_H
 #define RQT_VERIFY_H
@@ -27,39 +27,58 @@ typedef struct verify_triangle {
 
 /* The full-resolution samples of a window: the caller makes it large enough to hold every triangle. */
 typedef struct verify_samples {
-    int32_t col0, row0, width, height;
-    const int32_t *q;     /* width * height, row by row */
-    const uint8_t *valid; /* the same, 0 or 1; NULL when all are valid */
-    double quantum;       /* metres per height quantum, > 0 */
+    int32_t col0, row0, width, height; /* col0 + width and row0 + height are int32_t too */
+    const int32_t *q;      /* width * height, row by row; any int32_t will do, and a void's is not read */
+    const uint8_t *valid;  /* the same, 0 or 1; NULL when all are valid */
+    double quantum;        /* metres per height quantum, > 0 */
     double cell_x, cell_y; /* CRS units per sample step, either sign: only |cell_x * cell_y| is used */
-    /* Is this sample (inside the window) one that the mesh promised to cover? NULL: none is. Called once per sample. */
+    /* Is this sample (inside the window) one that the mesh promised to cover? NULL: none is. Called once per
+     * sample. */
     bool (*is_promised)(void *context, int32_t col, int32_t row);
     void *context;
 } verify_samples;
 
 typedef struct verify_report {
-    uint64_t samples;   /* valid samples that lie in a closed triangle, each counted once */
+    /* Valid samples that lie in a closed triangle, each counted once. A triangle of no area contains none. */
+    uint64_t samples;
     uint64_t vertices;  /* distinct (col,row) among the corners */
     uint64_t triangles; /* as given */
-    double max_error;   /* metres: the largest |sample - plane| over all valid samples in all closed triangles; 0 when none.
-                           The double nearest to the exact value times quantum (computed so that an exact value <= eps never
-                           reads > eps, for an eps that is a double) */
-    double rms_error;   /* metres: over the counted samples, each with its largest deviation */
-    int32_t worst_col, worst_row; /* where max_error is; the first in row order when there are ties */
-    uint64_t t_junctions; /* pairs (vertex, edge) with the vertex strictly inside the edge of a triangle it is no corner of,
-                             plus pairs of corners at one (col,row) with different q: a vertical crack */
-    uint64_t overlaps;    /* pairs of triangles whose interiors meet, plus clockwise and zero-area triangles */
-    uint64_t uncovered;   /* promised samples in no closed triangle */
-    uint64_t void_touched; /* void samples that are a corner of a triangle */
-    uint64_t twice_area;  /* twice the sum of the triangles' areas, in cells */
-    double area;          /* the same, halved, in CRS units squared */
+    /* Metres: the largest |sample - plane| over all valid samples in all closed triangles; 0 when there are none.
+     * It is the double nearest to the exact value times quantum, rounded once, so that for an eps that is a double
+     * an exact value <= eps never reads > eps. */
+    double max_error;
+    double rms_error; /* metres: over the counted samples, each with its largest deviation; in ordinary doubles */
+    /* Where max_error is; the first in row order when there are ties, also when all are 0. 0, 0 without samples. */
+    int32_t worst_col, worst_row;
+    /* Pairs (vertex, edge) with the vertex strictly inside the edge of a triangle it is no corner of, plus pairs of
+     * different heights at one (col,row): a vertical crack. A vertex is a place, an edge two places in either
+     * order, a height a number: what several triangles share is one. The pairs (vertex, edge) are counted up to
+     * 1000000. */
+    uint64_t t_junctions;
+    /* Pairs of triangles whose interiors meet, counted up to 1000000, plus clockwise and zero-area triangles. The
+     * interior of a clockwise triangle counts, and a triangle given twice is a pair. */
+    uint64_t overlaps;
+    uint64_t uncovered;    /* promised samples, valid or not, in no closed triangle */
+    uint64_t void_touched; /* void samples that are a corner of a triangle, each counted once */
+    uint64_t twice_area;   /* twice the sum of the triangles' areas, in cells; clockwise ones count as positive */
+    double area;           /* the same, halved, in CRS units squared */
 } verify_report;
 
-typedef enum verify_status { VERIFY_OK = 0, VERIFY_NO_MEMORY, VERIFY_INVALID /* a corner outside the window */ } verify_status;
+typedef enum verify_status {
+    VERIFY_OK = 0,
+    VERIFY_NO_MEMORY,
+    VERIFY_INVALID /* a corner outside the window or the limits above; a missing array; a quantum that is not > 0 */
+} verify_status;
 
-/* Counter-clockwise seen from above: with rows growing south, corner a, b, c have
- * (bx-ax)*(cy-ay) - (cx-ax)*(by-ay) < 0. */
-verify_status verify_mesh(const verify_samples *samples, const verify_triangle *triangles, size_t n, verify_report *report);
+/* Unless it returns VERIFY_OK the report is all zeros.
+ *
+ * Counter-clockwise seen from above: with rows growing south, corner a, b, c have
+ * (bx-ax)*(cy-ay) - (cx-ax)*(by-ay) < 0.
+ *
+ * Memory: 8 bytes per sample of the window, and up to some 100 per triangle. Time: in step with the samples in all
+ * triangles, plus the triangles whose boxes are alike in size and place. */
+verify_status verify_mesh(const verify_samples *samples, const verify_triangle *triangles, size_t n,
+                          verify_report *report);
 
 #ifdef __cplusplus
 }

@@ -1,0 +1,68 @@
+/* strip.c - one generalized triangle strip through a patch.
+ *
+ * The patch lists its triangles along a space-filling curve, so a triangle nearly always shares an edge with the one
+ * before and the one after. Of a triangle whose first two vertices the strip ends in, the edge that the next one shares
+ * says what to append: the third vertex alone, or one vertex again to turn the corner. Where the curve jumps (another
+ * block, the region's rim, a void) repeated vertices make triangles without area. The parity is kept throughout:
+ * triangle i is counter-clockwise as (i, i+1, i+2) for even i and as (i, i+2, i+1) for odd i.
+ *
+ * 1.5 to 1.65 indices a triangle on terrain; never more than 5.
+ */
+#include "internal.h"
+
+static bool holds(const uint32_t *triangle, uint32_t vertex) {
+    return triangle[0] == vertex || triangle[1] == vertex || triangle[2] == vertex;
+}
+
+/* Is from -> to an edge of the triangle, in its winding? *opposite: its third vertex. */
+static bool has_edge(const uint32_t *triangle, uint32_t from, uint32_t to, uint32_t *opposite) {
+    for (int i = 0; i < 3; i++) {
+        if (triangle[i] != from || triangle[(i + 1) % 3] != to) continue;
+        *opposite = triangle[(i + 2) % 3];
+        return true;
+    }
+    return false;
+}
+
+rqt_status rqt_strip_build(const rqt_patch *patch, const rqt_allocator *allocator, uint32_t **strip, size_t *n) {
+    *strip = NULL;
+    *n = 0;
+    if (patch->triangle_count == 0) return RQT_OK;
+    uint32_t *s = NULL;
+    size_t capacity = 0, count = 0;
+    for (size_t t = 0; t < patch->triangle_count; t++) {
+        const uint32_t *now = patch->triangles + 3 * t;
+        const uint32_t *next = t + 1 < patch->triangle_count ? now + 3 : NULL;
+        if (!memory_grow(allocator, (void **)&s, &capacity, count + 5, sizeof *s)) {
+            memory_drop(allocator, s);
+            return RQT_NO_MEMORY;
+        }
+        if (count >= 2) {
+            const uint32_t u = s[count - 2], v = s[count - 1];
+            uint32_t third;
+            const bool even = (count & 1) == 0; /* parity of the triangle that starts at u */
+            if (even ? has_edge(now, u, v, &third) : has_edge(now, v, u, &third)) {
+                if (next && holds(next, u) && holds(next, third)) s[count++] = u;
+                s[count++] = third;
+                continue;
+            }
+        }
+        /* A start: first the vertex that the next triangle does not have. */
+        int first = 0;
+        if (next)
+            while (first < 2 && holds(next, now[first])) first++;
+        const uint32_t a = now[first], b = now[(first + 1) % 3], c = now[(first + 2) % 3];
+        if (count > 0) {
+            s[count] = s[count - 1];
+            s[count + 1] = a;
+            count += 2;
+        }
+        const bool even = (count & 1) == 0;
+        s[count++] = a;
+        s[count++] = even ? b : c;
+        s[count++] = even ? c : b;
+    }
+    *strip = s;
+    *n = count;
+    return RQT_OK;
+}

@@ -1,0 +1,44 @@
+/* internal.h - what the files of this room share and nobody else sees.
+ *
+ * format.c decides and allocates, text.c writes numbers, geometry.c writes polygons. Each format knows its size
+ * before it writes; `put` functions take the place to write at and return the place after. */
+#ifndef RQT_FORMAT_INTERNAL_H
+#define RQT_FORMAT_INTERNAL_H
+
+#include "format.h"
+
+#include <string.h>
+
+#define FORMAT_LIMIT 2147483647u /* bytes that SQLite can return */
+
+/* The box of a geometry; of an empty one it does not matter. */
+typedef struct format_box {
+    double min_x, min_y, max_x, max_y;
+} format_box;
+
+static inline uint8_t *put_byte(uint8_t *p, unsigned v) {
+    *p = (uint8_t)v;
+    return p + 1;
+}
+static inline uint8_t *put_u32(uint8_t *p, uint32_t v) {
+    for (int i = 0; i < 4; i++) p[i] = (uint8_t)(v >> 8 * i);
+    return p + 4;
+}
+static inline uint8_t *put_double(uint8_t *p, double v) {
+    uint64_t bits;
+    memcpy(&bits, &v, 8);
+    for (int i = 0; i < 8; i++) p[i] = (uint8_t)(bits >> 8 * i);
+    return p + 8;
+}
+
+/* Decimal digits of v, without end mark; returns their number, at most 20. text.c */
+int format_digits(uint64_t v, char *text);
+
+/* Bytes of the multipolygon of that many triangles: kind is wkb, gpkg or spatialite. At most 109 per triangle + 52;
+ * triangles is at most FORMAT_LIMIT. geometry.c */
+uint64_t geometry_size(format_kind kind, uint64_t triangles);
+/* Writes exactly that many. */
+void geometry_write(format_kind kind, const rqt_patch *patch, const format_frame *frame, const format_box *box,
+                    uint8_t *bytes);
+
+#endif

@@ -1,0 +1,40 @@
+/* verify_internal.h - what the verifier's own files share. No other part of the program includes it. */
+#ifndef RQT_VERIFY_INTERNAL_H
+#define RQT_VERIFY_INTERNAL_H
+
+#include "verify.h"
+
+__extension__ typedef __int128 verify_wide;
+__extension__ typedef unsigned __int128 verify_uwide;
+
+enum {
+    VERIFY_CORNER_LIMIT =
+        1 << 21, /* |col|, |row| are below it, so differences are below 2^22 and areas below 2^45 */
+    VERIFY_HEIGHT_LIMIT = 1 << 30,
+    VERIFY_COUNT_CAP = 1000000, /* pairs are counted up to here: see verify.h */
+};
+
+/* The index of a sample known to be inside the window. */
+static inline size_t verify_index(const verify_samples *samples, int32_t col, int32_t row) {
+    return (size_t)((int64_t)row - samples->row0) * (size_t)samples->width + (size_t)((int64_t)col - samples->col0);
+}
+
+/* (b-a) x (c-a): twice the signed area. With rows growing south it is negative when a, b, c run counter-clockwise.
+ */
+static inline int64_t verify_cross(const verify_corner *a, const verify_corner *b, const verify_corner *c) {
+    return ((int64_t)b->col - a->col) * ((int64_t)c->row - a->row) -
+           ((int64_t)c->col - a->col) * ((int64_t)b->row - a->row);
+}
+
+/* Fills samples, max_error, rms_error, worst_col, worst_row and uncovered. */
+verify_status verify_measure_error(const verify_samples *samples, const verify_triangle *triangles, size_t n,
+                                   verify_report *report);
+
+/* Fills vertices, void_touched and t_junctions. */
+verify_status verify_measure_cracks(const verify_samples *samples, const verify_triangle *triangles, size_t n,
+                                    verify_report *report);
+
+/* Fills overlaps. */
+verify_status verify_measure_overlaps(const verify_triangle *triangles, size_t n, verify_report *report);
+
+#endif
