@@ -1,6 +1,15 @@
-/* block_codec.c - blocks in bytes (FORMAT.md, "Block"): first correct version. */
-#define ZSTD_STATIC_LINKING_ONLY
-#include "internal.h"
+/* block_codec.c - blocks in bytes and back (FORMAT.md, "Block").
+ *
+ * A block is a header of 32 bytes and one zstd frame. What is compressed are residuals (block_predict.c) as planes:
+ * all low bytes, then all high bytes. High bytes are nearly constant, and apart from the low ones they cost nearly
+ * nothing, to store or to decode. Then come the bits of validity and outline, where there are any.
+ *
+ * A writer may say the same in only one way: bits that are all alike are a flag, padding is zero, what lies under a
+ * void or beyond the raster is not looked at. A reader believes nothing. It goes from cheap to dear: the header's
+ * fields, the frame's own bookkeeping, the checksum, the decompressed bytes. After the header has passed, all sizes
+ * are known and within the codec's buffers. */
+#define ZSTD_STATIC_LINKING_ONLY /* contexts with an allocator: exported by every libzstd since 1.3 */
+#include "block_predict.h"
 
 #include <math.h>
 #include <zstd.h>
@@ -17,28 +26,50 @@ enum {
     AT_QUANTUM = 16,
     AT_CHECKSUM = 24,
     HEADER_BYTES = 32,
+
     HAS_VOIDS = 1,
     ALL_VOID = 2,
     HAS_OUTLINE = 4,
-    LARGEST_N = (1 << RQT_MAX_BLOCK_K) + 1,
-    LARGEST_COUNT = LARGEST_N * LARGEST_N,
-    LARGEST_PAYLOAD = LARGEST_COUNT * 6 + 2 * ((LARGEST_COUNT + 7) / 8),
-    LEVEL = 3
+    KNOWN_FLAGS = 7,
+
+    HEIGHT_PLANES = 4, /* at most */
+    ERROR_PLANES = 2,
+
+    /* Residuals of terrain have an entropy and hardly any repeats: higher levels search longer and find nothing. */
+    ZSTD_LEVEL = 3
 };
+
+#define BIT_BYTES(count) (((count) + 7) / 8)
+#define PAYLOAD_BOUND(count) ((count) * (HEIGHT_PLANES + ERROR_PLANES) + 2 * BIT_BYTES(count))
 
 struct rqt_codec {
     rqt_allocator allocator;
     ZSTD_CCtx *compressor;
     ZSTD_DCtx *decompressor;
-    int32_t q[LARGEST_COUNT];
     uint32_t residual[LARGEST_COUNT];
+    int32_t q[LARGEST_COUNT]; /* a block of our own: to encode from, and to decode to for a check */
     rqt_code error[LARGEST_COUNT];
     uint8_t flags[LARGEST_COUNT];
-    uint8_t payload[LARGEST_PAYLOAD];
+    error_scratch errors;
+    uint8_t payload[PAYLOAD_BOUND(LARGEST_COUNT)];
 };
 
-static void *zstd_take(void *opaque, size_t bytes) { return memory_take(opaque, bytes); }
-static void zstd_drop(void *opaque, void *p) { memory_drop(opaque, p); }
+static int32_t side_of(int k) {
+    return (1 << k) + 1;
+}
+static size_t count_of(int k) {
+    return (size_t)side_of(k) * (size_t)side_of(k);
+}
+static size_t stored_of(const rqt_block_header *h) {
+    return (size_t)h->width * (size_t)h->height;
+}
+
+static void *zstd_take(void *opaque, size_t bytes) {
+    return memory_take(opaque, bytes);
+}
+static void zstd_drop(void *opaque, void *p) {
+    memory_drop(opaque, p);
+}
 
 rqt_status rqt_codec_create(const rqt_allocator *allocator, rqt_codec **codec) {
     *codec = NULL;
@@ -52,282 +83,386 @@ rqt_status rqt_codec_create(const rqt_allocator *allocator, rqt_codec **codec) {
         rqt_codec_free(c);
         return RQT_NO_MEMORY;
     }
+    /* The frame says how long its content is, and leaves checking to our checksum. */
+    (void)ZSTD_CCtx_setParameter(c->compressor, ZSTD_c_compressionLevel, ZSTD_LEVEL);
+    (void)ZSTD_CCtx_setParameter(c->compressor, ZSTD_c_contentSizeFlag, 1);
+    (void)ZSTD_CCtx_setParameter(c->compressor, ZSTD_c_checksumFlag, 0);
     *codec = c;
     return RQT_OK;
 }
 
 void rqt_codec_free(rqt_codec *codec) {
     if (!codec) return;
-    ZSTD_freeCCtx(codec->compressor);
-    ZSTD_freeDCtx(codec->decompressor);
-    rqt_allocator a = codec->allocator;
-    memory_drop(&a, codec);
+    (void)ZSTD_freeCCtx(codec->compressor);
+    (void)ZSTD_freeDCtx(codec->decompressor);
+    const rqt_allocator allocator = codec->allocator;
+    memory_drop(&allocator, codec);
 }
-
-static size_t side_of(int k) { return ((size_t)1 << k) + 1; }
 
 size_t rqt_block_bound(int k) {
     if (k < 0 || k > RQT_MAX_BLOCK_K) return 0;
-    size_t count = side_of(k) * side_of(k);
-    return HEADER_BYTES + ZSTD_COMPRESSBOUND(count * 6 + 2 * ((count + 7) / 8));
+    return HEADER_BYTES + ZSTD_COMPRESSBOUND(PAYLOAD_BOUND(count_of(k)));
 }
 
+/* ---------------------------------------------------------------------------------------------- header */
+
 static size_t payload_of(const rqt_block_header *h) {
-    size_t stored = (size_t)h->width * (size_t)h->height, count = side_of(h->k) * side_of(h->k);
-    return stored * (size_t)h->height_planes + count * (size_t)h->error_planes +
-           (h->has_voids ? (stored + 7) / 8 : 0) + (h->has_outline ? (count + 7) / 8 : 0);
+    return stored_of(h) * (size_t)h->height_planes + count_of(h->k) * (size_t)h->error_planes +
+           (h->has_voids ? BIT_BYTES(stored_of(h)) : 0) + (h->has_outline ? BIT_BYTES(count_of(h->k)) : 0);
+}
+
+static void put_header(const rqt_block_header *h, uint8_t *bytes) {
+    memset(bytes, 0, HEADER_BYTES);
+    memcpy(bytes, "RQTB", 4);
+    bytes[AT_VERSION] = (uint8_t)h->version;
+    bytes[AT_K] = (uint8_t)h->k;
+    bytes[AT_FLAGS] = (uint8_t)((h->has_voids ? HAS_VOIDS : 0) | (h->all_void ? ALL_VOID : 0) |
+                                (h->has_outline ? HAS_OUTLINE : 0));
+    bytes[AT_PLANES] = (uint8_t)(h->height_planes | h->error_planes << 4);
+    put16(bytes + AT_WIDTH, (uint16_t)h->width);
+    put16(bytes + AT_HEIGHT, (uint16_t)h->height);
+    put32(bytes + AT_PAYLOAD, (uint32_t)h->payload);
+    put_double(bytes + AT_QUANTUM, h->quantum);
+}
+
+static rqt_status corrupt(rqt_message *message, const char *sentence) {
+    sentence_begin(message, sentence);
+    return RQT_CORRUPT;
+}
+
+static rqt_status corrupt_number(rqt_message *message, const char *what, int64_t number) {
+    sentence_begin(message, what);
+    sentence_add_integer(message, number);
+    return RQT_CORRUPT;
 }
 
 rqt_status rqt_block_info(const uint8_t *bytes, size_t size, rqt_block_header *header, rqt_message *message) {
     memset(header, 0, sizeof *header);
-    sentence_begin(message, "the block's header is wrong");
-    if (size <= HEADER_BYTES || memcmp(bytes, "RQTB", 4) != 0 || bytes[AT_VERSION] != RQT_FORMAT_VERSION)
-        return RQT_CORRUPT;
-    rqt_block_header h = {
+    if (size < HEADER_BYTES)
+        return corrupt_number(message, "not a block: its header takes 32 bytes, not ", (int64_t)size);
+    if (memcmp(bytes, "RQTB", 4) != 0) return corrupt(message, "not a block: it does not begin with RQTB");
+    if (bytes[AT_VERSION] != RQT_FORMAT_VERSION)
+        return corrupt_number(message, "a block of unknown format version ", bytes[AT_VERSION]);
+    const uint8_t flags = bytes[AT_FLAGS];
+    const rqt_block_header h = {
         .version = bytes[AT_VERSION],
         .k = bytes[AT_K],
         .width = get16(bytes + AT_WIDTH),
         .height = get16(bytes + AT_HEIGHT),
-        .has_voids = bytes[AT_FLAGS] & HAS_VOIDS,
-        .all_void = bytes[AT_FLAGS] & ALL_VOID,
-        .has_outline = bytes[AT_FLAGS] & HAS_OUTLINE,
+        .has_voids = flags & HAS_VOIDS,
+        .all_void = flags & ALL_VOID,
+        .has_outline = flags & HAS_OUTLINE,
         .height_planes = bytes[AT_PLANES] & 15,
         .error_planes = bytes[AT_PLANES] >> 4,
         .quantum = get_double(bytes + AT_QUANTUM),
         .payload = get32(bytes + AT_PAYLOAD),
     };
-    if (h.k > RQT_MAX_BLOCK_K || bytes[AT_FLAGS] > 7 || (h.has_voids && h.all_void) || h.height_planes > 4 ||
-        h.error_planes > 2 || (h.all_void && h.height_planes) || h.width < 1 || h.height < 1 ||
-        (size_t)h.width > side_of(h.k) || (size_t)h.height > side_of(h.k) || !isfinite(h.quantum) ||
-        !(h.quantum > 0) || h.payload != payload_of(&h))
-        return RQT_CORRUPT;
-    if (size - HEADER_BYTES < 4 || get32(bytes + HEADER_BYTES) != ZSTD_MAGICNUMBER ||
-        ZSTD_findFrameCompressedSize(bytes + HEADER_BYTES, size - HEADER_BYTES) != size - HEADER_BYTES)
-        return RQT_CORRUPT;
+    if (h.k > RQT_MAX_BLOCK_K) return corrupt_number(message, "the block's k is too large: ", h.k);
+    if (flags > KNOWN_FLAGS || (h.has_voids && h.all_void))
+        return corrupt_number(message, "the block's flags make no sense: ", flags);
+    if (h.height_planes > HEIGHT_PLANES || h.error_planes > ERROR_PLANES || (h.all_void && h.height_planes))
+        return corrupt_number(message, "the block's planes make no sense: ", bytes[AT_PLANES]);
+    if (h.width < 1 || h.width > side_of(h.k))
+        return corrupt_number(message, "the block's width does not fit its k: ", h.width);
+    if (h.height < 1 || h.height > side_of(h.k))
+        return corrupt_number(message, "the block's height does not fit its k: ", h.height);
+    if (!isfinite(h.quantum) || !(h.quantum > 0)) return corrupt(message, "the block's quantum is not a length");
+    if (h.payload != payload_of(&h))
+        return corrupt_number(message, "the block's payload does not fit its header: ", (int64_t)h.payload);
+    /* zstd would also take frames of its older formats, frames to skip, and several frames in a row. */
+    const uint8_t *frame = bytes + HEADER_BYTES;
+    const size_t room = size - HEADER_BYTES;
+    if (room < 4 || get32(frame) != ZSTD_MAGICNUMBER || ZSTD_findFrameCompressedSize(frame, room) != room)
+        return corrupt(message, "the block's compressed bytes are cut off, or not what follows its header");
     *header = h;
     sentence_begin(message, "");
     return RQT_OK;
 }
 
-static uint32_t zigzag(uint32_t r) { return r << 1 ^ (0 - (r >> 31)); }
-static uint32_t unzigzag(uint32_t v) { return v >> 1 ^ (0 - (v & 1)); }
-
-static int32_t median_edge(const int32_t *q, int32_t n, int32_t x, int32_t y) {
-    const int32_t *p = q + (ptrdiff_t)y * n + x;
-    if (y == 0) return x ? p[-1] : 0;
-    if (x == 0) return p[-n];
-    int32_t w = p[-1], a = p[-n], c = p[-n - 1], low = w < a ? w : a, high = w < a ? a : w;
-    if (c <= low) return high;
-    if (c >= high) return low;
-    return (int32_t)((uint32_t)w + (uint32_t)a - (uint32_t)c);
-}
-
-static uint32_t code_near_above(float v) {
-    uint32_t bits;
-    memcpy(&bits, &v, 4);
-    return bits ? ((bits + 0xFFFF) >> 16) + 16512 : 0;
-}
-
-typedef struct errors_pass {
-    int n, q;
-    const int32_t *z;
-    rqt_code *error;
-    uint32_t *residual;
-    float half;
-    bool decode;
-} errors_pass;
-
-static void error_step(errors_pass *e, int x, int y, int reach_x, int reach_y, int ax, int ay, bool middle) {
-    const int n = e->n;
-    uint32_t p = 0;
-    for (int c = 0; c < 4; c++) {
-        /* centres one step finer lie on the diagonals of a side vertex, sides on the axes of a centre */
-        int cx = reach_y ? (c & 1 ? reach_x : -reach_x) : (c == 0 ? -reach_x : c == 1 ? reach_x : 0);
-        int cy = reach_y ? (c & 2 ? reach_y : -reach_y) : (c == 2 ? -reach_x : c == 3 ? reach_x : 0);
-        if (x + cx < 0 || x + cx >= n || y + cy < 0 || y + cy >= n) continue;
-        uint32_t code = e->error[(y + cy) * n + x + cx];
-        if ((cx || cy) && code > p) p = code;
-    }
-    if (middle) {
-        uint32_t d = 2 * (uint32_t)e->z[y * n + x] - (uint32_t)e->z[(y - ay) * n + x - ax] -
-                     (uint32_t)e->z[(y + ay) * n + x + ax];
-        uint32_t code = code_near_above(fabsf((float)(int32_t)d) * e->half);
-        if (code > p) p = code;
-    }
-    rqt_code *at = &e->error[y * n + x];
-    if (e->decode)
-        *at = (rqt_code)(p + unzigzag(*e->residual++));
-    else
-        *e->residual++ = zigzag((uint32_t)(int32_t)(int16_t)(uint16_t)(*at - p)) & 0xFFFF;
-}
-
-static void code_errors(int k, const int32_t *z, rqt_code *error, uint32_t *residual, double quantum, bool decode) {
-    errors_pass e = {.n = (int)side_of(k), .z = z, .error = error, .residual = residual, .decode = decode};
-    double half = quantum * (0.5 - 0x1p-21);
-    e.half = (float)(half < 0x1p-90 ? 0x1p-90 : half > 0x1p90 ? 0x1p90 : half);
-    const int last = e.n - 1;
-    for (int q = 1; q < last; q *= 2) {
-        for (int y = 0; y <= last; y += q) {
-            bool odd = y / q & 1;
-            for (int x = odd ? 0 : q; x <= last; x += 2 * q)
-                error_step(&e, x, y, q / 2, q / 2, odd ? 0 : q, odd ? q : 0, true);
-        }
-        for (int y = q; y < last; y += 2 * q)
-            for (int x = q; x < last; x += 2 * q)
-                error_step(&e, x, y, q, 0, q, (x ^ y) & 2 * q ? -q : q, 2 * q < last);
-    }
-    for (int c = 0; c < 4; c++) {
-        rqt_code *at = &error[(c & 2 ? last * e.n : 0) + (c & 1 ? last : 0)];
-        if (decode)
-            *at = (rqt_code)unzigzag(*e.residual++);
-        else
-            *e.residual++ = zigzag((uint32_t)(int32_t)(int16_t)*at) & 0xFFFF;
-    }
-}
+/* ------------------------------------------------------------------------------------- planes and bits */
 
 static int put_planes(uint8_t **to, const uint32_t *v, size_t count) {
     uint32_t all = 0;
     for (size_t i = 0; i < count; i++) all |= v[i];
     int planes = 0;
     for (; all; all >>= 8, planes++) {
-        for (size_t i = 0; i < count; i++) (*to)[i] = (uint8_t)(v[i] >> 8 * planes);
+        uint8_t *p = *to;
+        for (size_t i = 0; i < count; i++) p[i] = (uint8_t)(v[i] >> 8 * planes);
         *to += count;
     }
     return planes;
 }
 
-static void get_planes(const uint8_t **from, uint32_t *v, size_t count, int planes) {
-    memset(v, 0, count * sizeof *v);
-    for (int plane = 0; plane < planes; plane++, *from += count)
-        for (size_t i = 0; i < count; i++) v[i] |= (uint32_t)(*from)[i] << 8 * plane;
+static int put_planes16(uint8_t **to, const uint16_t *v, size_t count) {
+    uint16_t all = 0;
+    for (size_t i = 0; i < count; i++) all |= v[i];
+    int planes = 0;
+    for (; all; all >>= 8, planes++) {
+        uint8_t *p = *to;
+        for (size_t i = 0; i < count; i++) p[i] = (uint8_t)(v[i] >> 8 * planes);
+        *to += count;
+    }
+    return planes;
+}
+
+/* n numbers from the planes that start at p and are `plane` bytes apart. */
+static void get_planes(const uint8_t *p, size_t plane, int planes, int32_t n, uint32_t *v) {
+    const uint8_t *a = p, *b = a + plane, *c = b + plane, *d = c + plane;
+    switch (planes) {
+    case 0:
+        for (int32_t i = 0; i < n; i++) v[i] = 0;
+        break;
+    case 1:
+        for (int32_t i = 0; i < n; i++) v[i] = a[i];
+        break;
+    case 2:
+        for (int32_t i = 0; i < n; i++) v[i] = (uint32_t)(a[i] | b[i] << 8);
+        break;
+    case 3:
+        for (int32_t i = 0; i < n; i++) v[i] = (uint32_t)(a[i] | b[i] << 8 | c[i] << 16);
+        break;
+    default:
+        for (int32_t i = 0; i < n; i++) v[i] = (uint32_t)(a[i] | b[i] << 8 | c[i] << 16) | (uint32_t)d[i] << 24;
+        break;
+    }
+}
+
+static void get_planes16(const uint8_t *p, size_t count, int planes, uint16_t *v) {
+    const uint8_t *high = p + count;
+    if (planes == 0) memset(v, 0, count * sizeof *v);
+    if (planes == 1)
+        for (size_t i = 0; i < count; i++) v[i] = p[i];
+    if (planes == 2)
+        for (size_t i = 0; i < count; i++) v[i] = (uint16_t)(p[i] | high[i] << 8);
+}
+
+/* One bit per element of a row, low bit first, from bit `at` on; returns how many were set. */
+static size_t put_bits(uint8_t *bits, size_t at, const uint8_t *flags, int32_t n, int flag) {
+    size_t set = 0;
+    for (int32_t x = 0; x < n; x++, at++)
+        if (flags[x] & flag) {
+            bits[at / 8] = (uint8_t)(bits[at / 8] | 1 << at % 8);
+            set++;
+        }
+    return set;
+}
+
+static size_t get_bits(const uint8_t *bits, size_t at, uint8_t *flags, int32_t n, int flag) {
+    size_t set = 0;
+    for (int32_t x = 0; x < n; x++, at++) {
+        const int bit = bits[at / 8] >> at % 8 & 1;
+        flags[x] = (uint8_t)(flags[x] | bit * flag);
+        set += (size_t)bit;
+    }
+    return set;
+}
+
+static bool padding_is_zero(const uint8_t *bits, size_t count) {
+    return count % 8 == 0 || bits[count / 8] >> count % 8 == 0;
+}
+
+/* ---------------------------------------------------------------------------------------------- encode */
+
+/* Is this a block that can be stored? Counts its valid heights. */
+static bool is_sound(const rqt_block *b, size_t *valid) {
+    if (b->k < 0 || b->k > RQT_MAX_BLOCK_K) return false;
+    const int32_t n = side_of(b->k);
+    if (b->width < 1 || b->width > n || b->height < 1 || b->height > n) return false;
+    uint32_t bad = 0;
+    int all = 0;
+    *valid = 0;
+    for (int32_t y = 0; y < b->height; y++)
+        for (int32_t x = 0; x < b->width; x++) {
+            const uint32_t q = (uint32_t)b->q[y * n + x], largest = RQT_HEIGHT_LIMIT - 1;
+            const uint32_t is_valid = b->flags[y * n + x] & RQT_VALID;
+            bad |= ((q + largest) | (largest - q)) & (0 - is_valid);
+            *valid += is_valid;
+        }
+    for (size_t i = 0; i < count_of(b->k); i++) all |= b->flags[i];
+    return bad >> 31 == 0 && all <= (RQT_VALID | RQT_OUTLINE);
+}
+
+static int64_t lesser(int64_t a, int64_t b) {
+    return a < b ? a : b;
+}
+static int64_t greater(int64_t a, int64_t b) {
+    return a > b ? a : b;
+}
+
+/* Heights for the voids of a row: the plane through what is left and above, but no further than these; so they cost
+ * little, and no slope runs away over a wide void. start: a height of the block, to begin with. */
+static void fill_voids(int32_t *row, const int32_t *above, const uint8_t *flags, int32_t width, int32_t start) {
+    for (int32_t x = 0; x < width; x++) {
+        if (flags[x] & RQT_VALID) continue;
+        if (!above || x == 0) {
+            row[x] = x > 0 ? row[x - 1] : above ? above[0] : start;
+        } else {
+            const int64_t w = row[x - 1], n = above[x], plane = w + n - above[x - 1];
+            row[x] = (int32_t)greater(lesser(w, n), lesser(greater(w, n), plane));
+        }
+    }
+}
+
+/* The first valid height of a block, row by row; 0 when there is none. */
+static int32_t first_height(const rqt_block *b) {
+    const int32_t n = side_of(b->k);
+    for (int32_t y = 0; y < b->height; y++)
+        for (int32_t x = 0; x < b->width; x++)
+            if (b->flags[y * n + x] & RQT_VALID) return b->q[y * n + x];
+    return 0;
+}
+
+/* The stored rows of a block, with every void filled. */
+static void copy_filled(const rqt_block *b, int32_t *q) {
+    const int32_t n = side_of(b->k), start = first_height(b);
+    for (int32_t y = 0; y < b->height; y++) {
+        const ptrdiff_t at = (ptrdiff_t)y * n;
+        memcpy(q + at, b->q + at, (size_t)b->width * sizeof *q);
+        fill_voids(q + at, y ? q + at - n : NULL, b->flags + at, b->width, start);
+    }
+}
+
+/* Past the last sample stands the last sample again. */
+static void repeat_heights(int32_t *q, int32_t n, int32_t width, int32_t height) {
+    for (int32_t y = 0; y < height && width < n; y++)
+        for (int32_t x = width; x < n; x++) q[y * n + x] = q[y * n + width - 1];
+    for (int32_t y = height; y < n; y++) memcpy(q + y * n, q + (height - 1) * n, (size_t)n * sizeof *q);
+}
+
+static void repeat_flags(uint8_t *flags, int32_t n, int32_t width, int32_t height) {
+    for (int32_t y = 0; y < height && width < n; y++)
+        memset(flags + y * n + width, flags[y * n + width - 1], (size_t)(n - width));
+    for (int32_t y = height; y < n; y++) memcpy(flags + y * n, flags + (height - 1) * n, (size_t)n);
 }
 
 rqt_status rqt_block_encode(rqt_codec *codec, const rqt_block *block, double quantum, uint8_t *bytes,
                             size_t *size) {
     *size = 0;
-    if (block->k < 0 || block->k > RQT_MAX_BLOCK_K || !isfinite(quantum) || !(quantum > 0)) return RQT_INVALID;
-    const int32_t n = (int32_t)side_of(block->k), width = block->width, height = block->height;
-    if (width < 1 || width > n || height < 1 || height > n) return RQT_INVALID;
-    const size_t count = (size_t)n * (size_t)n, stored = (size_t)width * (size_t)height;
-    size_t valid = 0;
-    uint32_t *r = codec->residual;
-    for (int32_t y = 0; y < n; y++)
-        for (int32_t x = 0; x < n; x++) {
-            int32_t *at = &codec->q[y * n + x];
-            if (y >= height || x >= width) {
-                *at = y >= height ? at[-n] : at[-1];
-                continue;
-            }
-            int32_t p = median_edge(codec->q, n, x, y), q = block->q[y * n + x];
-            if (block->flags[y * n + x] & RQT_VALID) {
-                if (q <= -RQT_HEIGHT_LIMIT || q >= RQT_HEIGHT_LIMIT) return RQT_INVALID;
-                valid++;
-            } else {
-                q = p;
-            }
-            *r++ = zigzag((uint32_t)q - (uint32_t)p);
-            *at = q;
-        }
+    size_t valid;
+    if (!isfinite(quantum) || !(quantum > 0) || !is_sound(block, &valid)) return RQT_INVALID;
+    const int32_t n = side_of(block->k), width = block->width, height = block->height;
+    const size_t count = count_of(block->k), stored = (size_t)width * (size_t)height;
+    rqt_block_header h = {
+        .version = RQT_FORMAT_VERSION,
+        .k = block->k,
+        .width = width,
+        .height = height,
+        .has_voids = valid > 0 && valid < stored,
+        .all_void = valid == 0,
+        .quantum = quantum,
+    };
     uint8_t *p = codec->payload;
-    int height_planes = put_planes(&p, codec->residual, stored);
-    memcpy(codec->error, block->error, count * sizeof *codec->error);
-    code_errors(block->k, codec->q, codec->error, codec->residual, quantum, false);
-    int error_planes = put_planes(&p, codec->residual, count);
-    int flags = valid == 0 ? ALL_VOID : valid < stored ? HAS_VOIDS : 0;
-    if (flags & HAS_VOIDS) {
-        memset(p, 0, (stored + 7) / 8);
-        for (size_t i = 0; i < stored; i++) {
-            size_t at = i / (size_t)width * (size_t)n + i % (size_t)width;
-            if (block->flags[at] & RQT_VALID) p[i / 8] = (uint8_t)(p[i / 8] | 1 << i % 8);
-        }
-        p += (stored + 7) / 8;
+
+    copy_filled(block, codec->q);
+    for (int32_t y = 0; y < height; y++) {
+        const int32_t *row = codec->q + (ptrdiff_t)y * n;
+        predict_height_row(row, y ? row - n : NULL, width, codec->residual + (ptrdiff_t)y * width);
     }
-    memset(p, 0, (count + 7) / 8);
-    for (size_t i = 0; i < count; i++)
-        if (block->flags[i] & RQT_OUTLINE) {
-            flags |= HAS_OUTLINE;
-            p[i / 8] = (uint8_t)(p[i / 8] | 1 << i % 8);
-        }
-    if (flags & HAS_OUTLINE) p += (count + 7) / 8;
-    memset(bytes, 0, HEADER_BYTES);
-    memcpy(bytes, "RQTB", 4);
-    bytes[AT_VERSION] = RQT_FORMAT_VERSION;
-    bytes[AT_K] = (uint8_t)block->k;
-    bytes[AT_FLAGS] = (uint8_t)flags;
-    bytes[AT_PLANES] = (uint8_t)(height_planes | error_planes << 4);
-    put16(bytes + AT_WIDTH, (uint16_t)width);
-    put16(bytes + AT_HEIGHT, (uint16_t)height);
-    size_t payload = (size_t)(p - codec->payload);
-    put32(bytes + AT_PAYLOAD, (uint32_t)payload);
-    put_double(bytes + AT_QUANTUM, quantum);
-    size_t room = rqt_block_bound(block->k) - HEADER_BYTES;
-    size_t z = ZSTD_compressCCtx(codec->compressor, bytes + HEADER_BYTES, room, codec->payload, payload, LEVEL);
-    if (ZSTD_isError(z)) return RQT_NO_MEMORY;
-    *size = HEADER_BYTES + z;
+    h.height_planes = put_planes(&p, codec->residual, stored);
+
+    repeat_heights(codec->q, n, width, height);
+    predict_errors(&codec->errors, block->k, codec->q, quantum, block->error);
+    h.error_planes = put_planes16(&p, codec->errors.residual, count);
+
+    if (h.has_voids) {
+        memset(p, 0, BIT_BYTES(stored));
+        for (int32_t y = 0; y < height; y++)
+            put_bits(p, (size_t)y * (size_t)width, block->flags + (ptrdiff_t)y * n, width, RQT_VALID);
+        p += BIT_BYTES(stored);
+    }
+    memset(p, 0, BIT_BYTES(count));
+    h.has_outline = put_bits(p, 0, block->flags, n * n, RQT_OUTLINE) > 0;
+    if (h.has_outline) p += BIT_BYTES(count);
+
+    h.payload = (size_t)(p - codec->payload);
+    put_header(&h, bytes);
+    const size_t compressed = ZSTD_compress2(codec->compressor, bytes + HEADER_BYTES,
+                                             rqt_block_bound(block->k) - HEADER_BYTES, codec->payload, h.payload);
+    if (ZSTD_isError(compressed)) return RQT_NO_MEMORY; /* the bound leaves no other reason */
+    *size = HEADER_BYTES + compressed;
     put64(bytes + AT_CHECKSUM, checksum64(bytes, *size, AT_CHECKSUM));
     return RQT_OK;
 }
 
-static rqt_status decode(rqt_codec *codec, const uint8_t *bytes, size_t size, rqt_block *block,
-                         rqt_message *message) {
-    rqt_block_header h;
-    rqt_status status = rqt_block_info(bytes, size, &h, message);
-    if (status != RQT_OK) return status;
-    sentence_begin(message, "the block's bytes are damaged");
-    if (h.k != block->k || get64(bytes + AT_CHECKSUM) != checksum64(bytes, size, AT_CHECKSUM)) return RQT_CORRUPT;
-    size_t got = ZSTD_decompressDCtx(codec->decompressor, codec->payload, h.payload, bytes + HEADER_BYTES,
-                                     size - HEADER_BYTES);
-    if (ZSTD_isError(got) || got != h.payload) return RQT_CORRUPT;
-    const int32_t n = (int32_t)side_of(h.k), width = h.width, height = h.height;
-    const size_t count = (size_t)n * (size_t)n, stored = (size_t)width * (size_t)height;
-    const uint8_t *p = codec->payload;
-    get_planes(&p, codec->residual, stored, h.height_planes);
-    const uint8_t *validity = p + count * (size_t)h.error_planes;
-    const uint32_t *r = codec->residual;
-    size_t valid = 0;
-    for (int32_t y = 0; y < n; y++)
-        for (int32_t x = 0; x < n; x++) {
-            int32_t *at = &block->q[y * n + x];
-            uint8_t *flags = &block->flags[y * n + x];
-            if (y >= height || x >= width) {
-                *at = y >= height ? at[-n] : at[-1];
-                *flags = (uint8_t)((y >= height ? flags[-n] : flags[-1]) & RQT_VALID);
-                continue;
-            }
-            *at = (int32_t)((uint32_t)median_edge(block->q, n, x, y) + unzigzag(*r));
-            if (*at <= -RQT_HEIGHT_LIMIT || *at >= RQT_HEIGHT_LIMIT) return RQT_CORRUPT;
-            size_t i = (size_t)(r - codec->residual);
-            *flags = h.all_void ? 0 : !h.has_voids || validity[i / 8] >> i % 8 & 1;
-            if (!*flags && *r) return RQT_CORRUPT;
-            valid += *flags;
-            r++;
-        }
-    if (h.has_voids && (valid == 0 || valid == stored || (stored % 8 && validity[stored / 8] >> stored % 8)))
-        return RQT_CORRUPT;
-    get_planes(&p, codec->residual, count, h.error_planes);
-    code_errors(h.k, block->q, block->error, codec->residual, h.quantum, true);
-    if (h.has_outline) {
-        p += h.has_voids ? (stored + 7) / 8 : 0;
-        bool any = false;
-        for (size_t i = 0; i < count; i++)
-            if (p[i / 8] >> i % 8 & 1) block->flags[i] |= RQT_OUTLINE, any = true;
-        if (!any || (count % 8 && p[count / 8] >> count % 8)) return RQT_CORRUPT;
+/* ---------------------------------------------------------------------------------------------- decode */
+
+static bool restore_heights(rqt_codec *codec, const rqt_block_header *h, const uint8_t *planes, int32_t *q) {
+    const int32_t n = side_of(h->k);
+    uint32_t bad = 0;
+    for (int32_t y = 0; y < h->height; y++) {
+        int32_t *row = q + (ptrdiff_t)y * n;
+        get_planes(planes + (size_t)y * (size_t)h->width, stored_of(h), h->height_planes, h->width,
+                   codec->residual);
+        bad |= restore_height_row(codec->residual, y ? row - n : NULL, h->width, row);
     }
-    block->width = width;
-    block->height = height;
-    sentence_begin(message, "");
+    repeat_heights(q, n, h->width, h->height);
+    return bad >> 31 == 0;
+}
+
+static bool restore_validity(const rqt_block_header *h, const uint8_t *bits, uint8_t *flags) {
+    const int32_t n = side_of(h->k);
+    if (!h->has_voids) {
+        memset(flags, h->all_void ? 0 : RQT_VALID, count_of(h->k));
+        return true;
+    }
+    size_t valid = 0;
+    for (int32_t y = 0; y < h->height; y++) {
+        uint8_t *row = flags + (ptrdiff_t)y * n;
+        memset(row, 0, (size_t)h->width);
+        valid += get_bits(bits, (size_t)y * (size_t)h->width, row, h->width, RQT_VALID);
+    }
+    repeat_flags(flags, n, h->width, h->height);
+    return valid > 0 && valid < stored_of(h) && padding_is_zero(bits, stored_of(h));
+}
+
+static bool restore_outline(const rqt_block_header *h, const uint8_t *bits, uint8_t *flags) {
+    if (!h->has_outline) return true;
+    const size_t count = count_of(h->k);
+    return get_bits(bits, 0, flags, (int32_t)count, RQT_OUTLINE) > 0 && padding_is_zero(bits, count);
+}
+
+/* The header has passed rqt_block_info and is of block's k. */
+static rqt_status decode(rqt_codec *codec, const uint8_t *bytes, size_t size, const rqt_block_header *h,
+                         rqt_block *block, rqt_message *message) {
+    if (get64(bytes + AT_CHECKSUM) != checksum64(bytes, size, AT_CHECKSUM))
+        return corrupt(message, "the block's bytes have changed: its checksum differs");
+    /* Into the whole buffer: zstd is faster where it may write past the end. */
+    const size_t got = ZSTD_decompressDCtx(codec->decompressor, codec->payload, sizeof codec->payload,
+                                           bytes + HEADER_BYTES, size - HEADER_BYTES);
+    if (ZSTD_isError(got)) {
+        sentence_begin(message, "the block does not decompress: ");
+        sentence_add(message, ZSTD_getErrorName(got));
+        return RQT_CORRUPT;
+    }
+    if (got != h->payload)
+        return corrupt_number(message, "the block decompresses to another length than it says: ", (int64_t)got);
+    const uint8_t *errors = codec->payload + stored_of(h) * (size_t)h->height_planes;
+    const uint8_t *validity = errors + count_of(h->k) * (size_t)h->error_planes;
+    const uint8_t *outline = validity + (h->has_voids ? BIT_BYTES(stored_of(h)) : 0);
+    if (!restore_heights(codec, h, codec->payload, block->q))
+        return corrupt(message, "the block holds heights that are out of range");
+    get_planes16(errors, count_of(h->k), h->error_planes, codec->errors.residual);
+    restore_errors(&codec->errors, h->k, block->q, h->quantum, block->error);
+    if (!restore_validity(h, validity, block->flags))
+        return corrupt(message, "the block's validity bits are not what its flags promise");
+    if (!restore_outline(h, outline, block->flags))
+        return corrupt(message, "the block's outline bits are not what its flags promise");
+    block->width = h->width;
+    block->height = h->height;
     return RQT_OK;
 }
 
 rqt_status rqt_block_decode(rqt_codec *codec, const uint8_t *bytes, size_t size, rqt_block *block) {
-    return decode(codec, bytes, size, block, NULL);
+    rqt_block_header h;
+    const rqt_status status = rqt_block_info(bytes, size, &h, NULL);
+    if (status != RQT_OK) return status;
+    return h.k == block->k ? decode(codec, bytes, size, &h, block, NULL) : RQT_CORRUPT;
 }
 
 rqt_status rqt_block_check(rqt_codec *codec, const uint8_t *bytes, size_t size, rqt_message *message) {
-    rqt_block block = {.q = codec->q, .error = codec->error, .flags = codec->flags};
     rqt_block_header h;
-    rqt_status status = rqt_block_info(bytes, size, &h, message);
+    const rqt_status status = rqt_block_info(bytes, size, &h, message);
     if (status != RQT_OK) return status;
-    block.k = h.k;
-    return decode(codec, bytes, size, &block, message);
+    rqt_block block = {.k = h.k, .q = codec->q, .error = codec->error, .flags = codec->flags};
+    return decode(codec, bytes, size, &h, &block, message);
 }

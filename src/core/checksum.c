@@ -5,9 +5,13 @@
  * read as little-endian words wherever this runs. */
 #include "internal.h"
 
-static inline uint64_t rotate_left(uint64_t v, int by) { return v << by | v >> (64 - by); }
+static inline uint64_t rotate_left(uint64_t v, int by) {
+    return v << by | v >> (64 - by);
+}
 
-static inline uint64_t mix(uint64_t h, uint64_t w) { return rotate_left((h ^ w) * 0xC2B2AE3D27D4EB4FU, 29); }
+static inline uint64_t mix(uint64_t h, uint64_t w) {
+    return rotate_left((h ^ w) * 0xC2B2AE3D27D4EB4FU, 29);
+}
 
 static uint64_t mix_words(uint64_t h, const uint8_t *bytes, size_t words) {
     for (size_t i = 0; i < words; i++) h = mix(h, get64(bytes + 8 * i));

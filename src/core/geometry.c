@@ -6,14 +6,15 @@
 #include "geometry.h"
 
 static const char *const type_names[GEOMETRY_TYPES] = {
-    "GEOMETRY",     "POINT",           "LINESTRING",   "POLYGON",
-    "MULTIPOINT",   "MULTILINESTRING", "MULTIPOLYGON", "GEOMETRYCOLLECTION",
-    "CIRCULARSTRING", "COMPOUNDCURVE",   "CURVEPOLYGON", "MULTICURVE",
-    "MULTISURFACE", "CURVE",           "SURFACE",      "POLYHEDRALSURFACE",
-    "TIN",          "TRIANGLE",
+    "GEOMETRY",          "POINT",        "LINESTRING",         "POLYGON",        "MULTIPOINT",
+    "MULTILINESTRING",   "MULTIPOLYGON", "GEOMETRYCOLLECTION", "CIRCULARSTRING", "COMPOUNDCURVE",
+    "CURVEPOLYGON",      "MULTICURVE",   "MULTISURFACE",       "CURVE",          "SURFACE",
+    "POLYHEDRALSURFACE", "TIN",          "TRIANGLE",
 };
 
-const char *geometry_type_name(uint32_t type) { return type < GEOMETRY_TYPES ? type_names[type] : "?"; }
+const char *geometry_type_name(uint32_t type) {
+    return type < GEOMETRY_TYPES ? type_names[type] : "?";
+}
 
 geometry_type geometry_member_type(uint32_t type) {
     switch (type) {
@@ -143,4 +144,6 @@ void rqt_geometry_free(rqt_geometry *geometry) {
     memory_drop(&a, geometry);
 }
 
-int32_t rqt_geometry_srid(const rqt_geometry *geometry) { return geometry->srid; }
+int32_t rqt_geometry_srid(const rqt_geometry *geometry) {
+    return geometry->srid;
+}

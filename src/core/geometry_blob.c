@@ -3,20 +3,19 @@
  * GeoPackage   "GP", version 0, flags, int32 srs_id, envelope, WKB. Flags: bit 0 little-endian header, bits 1-3 the
  *              kind of envelope (0 none, 1 xy, 2 xyz, 3 xym, 4 xyzm), bit 4 empty, bit 5 an extension's own format.
  * WKB          1 byte order, uint32 type, body. ISO adds 1000, 2000 or 3000 to the type for Z, M, ZM; EWKB sets the
- *              bits 0x80000000 and 0x40000000, and 0x20000000 when an int32 SRID follows. Both are read, each member
- *              in its own byte order. A point with x and y NaN is an empty point.
- * SpatiaLite   0x00, 0x00 or 0x01 byte order, int32 srid, box of 4 doubles, 0x7C at offset 38, int32 class type, body,
- *              0xFE last. Members of a collection start with 0x69 and a class type. Class types are ISO's; 1000000
- *              more for a compressed LINESTRING or POLYGON: all points but the first and the last are float32 steps
- *              from the one before in x, y and z; m stays a double.
- * TinyPoint    0x00, 0x80 or 0x81 byte order, int32 srid, 1 .. 4 for XY, XYZ, XYM, XYZM, the doubles, 0xFE.
+ *              bits 0x80000000 and 0x40000000, and 0x20000000 when an int32 SRID follows. Both are read, each
+ * member in its own byte order. A point with x and y NaN is an empty point. SpatiaLite   0x00, 0x00 or 0x01 byte
+ * order, int32 srid, box of 4 doubles, 0x7C at offset 38, int32 class type, body, 0xFE last. Members of a
+ * collection start with 0x69 and a class type. Class types are ISO's; 1000000 more for a compressed LINESTRING or
+ * POLYGON: all points but the first and the last are float32 steps from the one before in x, y and z; m stays a
+ * double. TinyPoint    0x00, 0x80 or 0x81 byte order, int32 srid, 1 .. 4 for XY, XYZ, XYM, XYZM, the doubles, 0xFE.
  *
  * Which one it is: "GP" is GeoPackage, 0x01 little-endian WKB. A leading 0x00 is big-endian WKB or SpatiaLite; its
  * second byte is then the top of the WKB type, 0x00 or flags from 0x20 up. So 0x01 and 0x81 there are SpatiaLite's;
  * 0x00 is when 0x7C and 0xFE are in place, and 0x80 when size, kind and end fit a TinyPoint. All else is WKB.
  *
- * Boxes and envelopes are skipped, not believed. Counts are hostile: each is checked against the bytes that are left
- * before anything is done with it, and arrays grow with what was really read. Sentences count bytes from 0. */
+ * Boxes and envelopes are skipped, not believed. Counts are hostile: each is checked against the bytes that are
+ * left before anything is done with it, and arrays grow with what was really read. Sentences count bytes from 0. */
 #include "geometry.h"
 
 #include <math.h>
@@ -35,10 +34,10 @@ typedef struct layout { /* of one entity */
     bool z, m, compressed;
 } layout;
 
-#define TRY(step)                                                                                                \
-    do {                                                                                                         \
-        rqt_status try_status = (step);                                                                          \
-        if (try_status != RQT_OK) return try_status;                                                             \
+#define TRY(step)                                    \
+    do {                                             \
+        rqt_status try_status = (step);              \
+        if (try_status != RQT_OK) return try_status; \
     } while (0)
 
 static rqt_status fail_at(const blob *b, const char *what, size_t at) {
@@ -92,8 +91,12 @@ static rqt_status take_count(blob *b, size_t smallest, size_t *count) {
 }
 
 /* -------------------------------------------------------------------------------------------- bodies -- */
-static size_t point_bytes(const layout *l) { return 16 + 8 * (size_t)l->z + 8 * (size_t)l->m; }
-static size_t step_bytes(const layout *l) { return 8 + 4 * (size_t)l->z + 8 * (size_t)l->m; }
+static size_t point_bytes(const layout *l) {
+    return 16 + 8 * (size_t)l->z + 8 * (size_t)l->m;
+}
+static size_t step_bytes(const layout *l) {
+    return 8 + 4 * (size_t)l->z + 8 * (size_t)l->m;
+}
 
 static rqt_status add_point(const blob *b, double x, double y, size_t at) {
     if (!isfinite(x) || !isfinite(y)) return fail_at(b, "a coordinate is not finite", at);
@@ -193,13 +196,15 @@ static rqt_status read_class_type(blob *b, layout *l, bool outermost) {
 static rqt_status read_entity(blob *b, geometry_type wanted, int depth) {
     layout l;
     size_t start = b->at;
-    if (b->spatialite) TRY(read_class_type(b, &l, depth == 0));
-    else TRY(read_wkb_type(b, &l, depth == 0));
+    if (b->spatialite)
+        TRY(read_class_type(b, &l, depth == 0));
+    else
+        TRY(read_wkb_type(b, &l, depth == 0));
     if (l.type < GEOMETRY_POINT || l.type > GEOMETRY_COLLECTION) return geometry_refuse_type(l.type, b->message);
     if (wanted != GEOMETRY_ANY && l.type != (uint32_t)wanted)
         return fail_at(b, "a member has another type than its collection", start);
     if (l.type <= GEOMETRY_POLYGON) return read_simple(b, &l);
-    if (depth > GEOMETRY_MAX_DEPTH) return fail_at(b, "collections are nested too deep", start);
+    if (depth == GEOMETRY_MAX_DEPTH) return fail_at(b, "collections are nested too deep", start);
     size_t members;
     TRY(take_count(b, 9, &members)); /* mark or byte order, type, and at least a count */
     for (size_t i = 0; i < members; i++) TRY(read_entity(b, geometry_member_type(l.type), depth + 1));

@@ -10,9 +10,9 @@
  *             | "(" tagged { "," tagged } ")"                     GEOMETRYCOLLECTION
  *     tuple   = number number [ number [ number ] ]
  *
- * Upper or lower case, white space anywhere between tokens. A suffix fixes how many numbers a tuple has; without one
- * the first tuple of each tagged geometry does, since EWKT writes POINT(1 2 3). One look-ahead character, no copy of
- * the text, recursion only into collections. Sentences count characters from 1. */
+ * Upper or lower case, white space anywhere between tokens. A suffix fixes how many numbers a tuple has; without
+ * one the first tuple of each tagged geometry does, since EWKT writes POINT(1 2 3). One look-ahead character, no
+ * copy of the text, recursion only into collections. Sentences count characters from 1. */
 #include "geometry.h"
 
 #include <math.h>
@@ -25,10 +25,10 @@ typedef struct wkt {
     rqt_message *message;
 } wkt;
 
-#define TRY(step)                                                                                                \
-    do {                                                                                                         \
-        rqt_status try_status = (step);                                                                          \
-        if (try_status != RQT_OK) return try_status;                                                             \
+#define TRY(step)                                    \
+    do {                                             \
+        rqt_status try_status = (step);              \
+        if (try_status != RQT_OK) return try_status; \
     } while (0)
 
 static rqt_status fail_at(const wkt *w, const char *what, size_t at) {
@@ -40,13 +40,23 @@ static rqt_status fail_at(const wkt *w, const char *what, size_t at) {
 
 /* ------------------------------------------------------------------------------------------- tokens -- */
 /* Not the functions of ctype.h: those follow the locale. */
-static bool is_space(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
-static bool is_digit(char c) { return c >= '0' && c <= '9'; }
-static char upper(char c) { return c >= 'a' && c <= 'z' ? (char)(c - 'a' + 'A') : c; }
-static bool is_letter(char c) { return upper(c) >= 'A' && upper(c) <= 'Z'; }
+static bool is_space(char c) {
+    return c == ' ' || (c >= '\t' && c <= '\r');
+}
+static bool is_digit(char c) {
+    return c >= '0' && c <= '9';
+}
+static char upper(char c) {
+    return c >= 'a' && c <= 'z' ? (char)(c - 'a' + 'A') : c;
+}
+static bool is_letter(char c) {
+    return upper(c) >= 'A' && upper(c) <= 'Z';
+}
 
 /* The character at the cursor; 0, which no token contains, past the end. */
-static char peek(const wkt *w) { return w->at < w->n ? w->text[w->at] : '\0'; }
+static char peek(const wkt *w) {
+    return w->at < w->n ? w->text[w->at] : '\0';
+}
 
 static void skip_space(wkt *w) {
     while (w->at < w->n && is_space(w->text[w->at])) w->at++;
@@ -81,9 +91,9 @@ static bool take_word(wkt *w, const char *word) {
 }
 
 /* ------------------------------------------------------------------------------------------ numbers -- */
-/* strtod reads the decimal point of the locale, whatever that is today. So it never sees one: 12.5e3 is handed to it
- * as 125e2. 768 digits decide how a decimal rounds to a double; of what follows only matters whether it is zero, so
- * one last digit stands for it, and a number of any length is read exactly. */
+/* strtod reads the decimal point of the locale, whatever that is today. So it never sees one: 12.5e3 is handed to
+ * it as 125e2. 768 digits decide how a decimal rounds to a double; of what follows only matters whether it is zero,
+ * so one last digit stands for it, and a number of any length is read exactly. */
 #define NUMBER_DIGITS 800
 #define NUMBER_EXPONENT 99999999 /* beyond it everything is 0 or infinite, however many digits there are */
 
@@ -119,7 +129,8 @@ static rqt_status read_number(wkt *w, double *value) {
         }
         if (!is_digit(c)) break;
         any = true;
-        if (kept < NUMBER_DIGITS && (kept > 0 || c != '0')) digits[kept++] = c;
+        if (kept < NUMBER_DIGITS && (kept > 0 || c != '0'))
+            digits[kept++] = c;
         else if (kept > 0) {
             cut |= c != '0';
             exponent++;
@@ -142,7 +153,8 @@ static rqt_status read_number(wkt *w, double *value) {
         exponent += down ? -e : e;
     }
     char next = peek(w);
-    if (w->at < w->n && !is_space(next) && next != ',' && next != ')') return fail_at(w, "a number is malformed", start);
+    if (w->at < w->n && !is_space(next) && next != ',' && next != ')')
+        return fail_at(w, "a number is malformed", start);
     *value = decimal_value(digits, kept, exponent);
     if (!isfinite(*value)) return fail_at(w, "a number is too large", start);
     if (negative) *value = -*value;
@@ -254,8 +266,10 @@ static rqt_status read_tagged(wkt *w, int depth) {
     TRY(expect(w, '('));
     geometry_type member = geometry_member_type(type);
     for (bool more = true; more;) {
-        if (member == GEOMETRY_ANY) TRY(read_tagged(w, depth + 1));
-        else TRY(read_simple(w, member, true, &ordinates));
+        if (member == GEOMETRY_ANY)
+            TRY(read_tagged(w, depth + 1));
+        else
+            TRY(read_simple(w, member, true, &ordinates));
         TRY(next_item(w, &more));
     }
     return RQT_OK;

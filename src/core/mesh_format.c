@@ -33,7 +33,8 @@ size_t rqt_mesh_bytes(const rqt_mesh_header *header) {
     if (header->vertex_count > room / VERTEX_BYTES) return SIZE_MAX;
     uint64_t left = room - header->vertex_count * VERTEX_BYTES;
     if (header->index_count > left / INDEX_BYTES) return SIZE_MAX;
-    return (size_t)(RQT_MESH_HEADER_BYTES + header->vertex_count * VERTEX_BYTES + header->index_count * INDEX_BYTES);
+    return (size_t)(RQT_MESH_HEADER_BYTES + header->vertex_count * VERTEX_BYTES +
+                    header->index_count * INDEX_BYTES);
 }
 
 void rqt_mesh_encode(const rqt_mesh_header *header, const rqt_patch_vertex *vertices, const uint32_t *indices,

@@ -1,6 +1,8 @@
-/* sentence.c - sentences about failures, put together without stdio: the core neither prints nor depends on a locale.
+/* sentence.c - sentences about failures, put together without stdio: the core neither prints nor depends on a
+ * locale.
  *
- * A message always ends within its 256 bytes. What does not fit is cut, never in the middle of a UTF-8 character. */
+ * A message always ends within its 256 bytes. What does not fit is cut, never in the middle of a UTF-8 character.
+ */
 #include "internal.h"
 
 void sentence_begin(rqt_message *message, const char *text) {

@@ -23,9 +23,12 @@ const char *import_crs_name(OGRSpatialReferenceH crs) {
     return name && *name ? name : "unnamed";
 }
 
-static bool is_degrees(OGRSpatialReferenceH crs) { return fabs(OSRGetAngularUnits(crs, NULL) - DEGREE) < 1e-12; }
+static bool is_degrees(OGRSpatialReferenceH crs) {
+    return fabs(OSRGetAngularUnits(crs, NULL) - DEGREE) < 1e-12;
+}
 
-/* Geographic, on WGS 84, in degrees from Greenwich: alike EPSG:4326 but for the order of the axes and for heights. */
+/* Geographic, on WGS 84, in degrees from Greenwich: alike EPSG:4326 but for the order of the axes and for heights.
+ */
 static bool is_wgs84(OGRSpatialReferenceH crs) {
     OGRSpatialReferenceH flat = OSRCloneGeogCS(crs), epsg = OSRNewSpatialReference(NULL);
     bool same = false;
@@ -36,15 +39,17 @@ static bool is_wgs84(OGRSpatialReferenceH crs) {
     if (flat && !same) {
         /* The same datum under the names that WKT dialects give it. */
         const char *datum = OSRGetAttrValue(flat, "DATUM", 0);
-        same = datum && is_degrees(flat) && fabs(OSRGetPrimeMeridian(flat, NULL)) < 1e-12 &&
-               (EQUAL(datum, "WGS_1984") || EQUAL(datum, "D_WGS_1984") || EQUAL(datum, "World Geodetic System 1984"));
+        same =
+            datum && is_degrees(flat) && fabs(OSRGetPrimeMeridian(flat, NULL)) < 1e-12 &&
+            (EQUAL(datum, "WGS_1984") || EQUAL(datum, "D_WGS_1984") || EQUAL(datum, "World Geodetic System 1984"));
     }
     if (flat) OSRDestroySpatialReference(flat);
     if (epsg) OSRDestroySpatialReference(epsg);
     return same;
 }
 
-/* The EPSG code of the horizontal part: regions and results are x and y, the vertical part has a column of its own. */
+/* The EPSG code of the horizontal part: regions and results are x and y, the vertical part has a column of its own.
+ */
 static int32_t srid_of(OGRSpatialReferenceH crs) {
     const char *part = OSRIsProjected(crs) ? "PROJCS" : OSRIsGeographic(crs) ? "GEOGCS" : NULL;
     const char *authority = OSRGetAuthorityName(crs, part), *code = OSRGetAuthorityCode(crs, part);
@@ -75,7 +80,8 @@ bool import_crs_describe(OGRSpatialReferenceH crs, import_crs *out) {
         out->lonlat = angles && is_degrees(crs);
         out->wgs84 = out->lonlat && is_wgs84(crs);
         out->srid = srid_find(crs);
-        if (!out->srid && out->wgs84) out->srid = 4326; /* OGC:CRS84 and the like: the same coordinates, as we order them */
+        if (!out->srid && out->wgs84)
+            out->srid = 4326; /* OGC:CRS84 and the like: the same coordinates, as we order them */
         double metres = angles ? OSRGetAngularUnits(crs, NULL) * EQUATOR : OSRGetLinearUnits(crs, NULL);
         if (isfinite(metres) && metres > 0) out->metres = metres;
     } else {

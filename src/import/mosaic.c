@@ -1,8 +1,8 @@
 /* mosaic.c - several sources on one grid.
  *
  * The first source's grid is the grid: every other one must have its CRS, its cell size and a whole number of cells
- * between the two, each within a thousandth of a cell over the whole source. What the union holds and no source covers is
- * void. Where sources overlap, the later one wins; read.c counts.
+ * between the two, each within a thousandth of a cell over the whole source. What the union holds and no source
+ * covers is void. Where sources overlap, the later one wins; read.c counts.
  */
 #include "source.h"
 
@@ -12,22 +12,25 @@
 #define SLACK 1e-3 /* cells */
 
 /* One axis of source s against the first: the cell at which s begins. */
-static bool align(const import_job *job, const import_source *first, const import_source *s, bool rows, int64_t *cell) {
+static bool align(const import_job *job, const import_source *first, const import_source *s, bool rows,
+                  int64_t *cell) {
     double from = rows ? first->placement.y0 : first->placement.x0, to = rows ? s->placement.y0 : s->placement.x0;
     double step = rows ? first->placement.dy : first->placement.dx, own = rows ? s->placement.dy : s->placement.dx;
     int32_t n = rows ? s->height : s->width;
     double drift = fabs(own - step) / fabs(step) * (n > 1 ? n - 1 : 1);
     if (!(drift <= SLACK))
-        return import_refuse(job, "%s has cells of %.12g in %s, %s of %.12g: the sources of a terrain share one grid",
+        return import_refuse(job,
+                             "%s has cells of %.12g in %s, %s of %.12g: the sources of a terrain share one grid",
                              s->path, fabs(own), rows ? "y" : "x", first->path, fabs(step));
     double offset = (to - from) / step;
     if (!(fabs(offset) < 1e9))
-        return import_refuse(job, "%s lies %.10g cells from %s in %s: too far for one terrain", s->path, fabs(offset),
-                             first->path, rows ? "y" : "x");
+        return import_refuse(job, "%s lies %.10g cells from %s in %s: too far for one terrain", s->path,
+                             fabs(offset), first->path, rows ? "y" : "x");
     double off = fabs(offset - rint(offset));
     if (!(off <= SLACK))
-        return import_refuse(job, "%s lies %.6f cells from %s in %s, which is no whole number: the sources of a terrain "
-                                  "share one grid",
+        return import_refuse(job,
+                             "%s lies %.6f cells from %s in %s, which is no whole number: the sources of a terrain "
+                             "share one grid",
                              s->path, offset, first->path, rows ? "y" : "x");
     *cell = (int64_t)rint(offset);
     return true;
@@ -98,7 +101,8 @@ static void choose_kind(const import_job *job, const import_source *sources, int
                           sources[0].path);
         return;
     }
-    if (!floats) import_notice(job, "the sources differ in unit, scale or offset: their heights are kept in metres");
+    if (!floats)
+        import_notice(job, "the sources differ in unit, scale or offset: their heights are kept in metres");
     m->kind = single && metres ? IMPORT_F32 : IMPORT_F64;
     /* Without a float among the sources there is no float type to be met. */
     m->scheme = (import_scheme){.unit = metre,

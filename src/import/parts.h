@@ -3,10 +3,9 @@
  *   source.c    one GDAL source, described: type, place, CRS, what is void            (crs.c, units.c help)
  *   mosaic.c    all sources on one grid, and the kind of number that holds them all
  *   read.c      GDAL windows -> values + validity of the whole grid
- *   quantise.c  values -> int32 heights q and the rqt_unit that makes metres of them  (survey.c looks at them first)
- *   blocks.c    q + saturated errors -> encoded blocks, by threads, written in order
- *   database.c  the SQLite file: opened, refused, committed or left as it was
- *   import.c    the whole
+ *   quantise.c  values -> int32 heights q and the rqt_unit that makes metres of them  (survey.c looks at them
+ * first) blocks.c    q + saturated errors -> encoded blocks, by threads, written in order database.c  the SQLite
+ * file: opened, refused, committed or left as it was import.c    the whole
  *
  * Only source.c, crs.c and read.c know GDAL; database.c and blocks.c only know SQLite and the store.
  */
@@ -41,8 +40,8 @@ typedef struct import_unit {
     int32_t numerator, denominator;
 } import_unit;
 
-/* The unit of this name ("" and NULL are the metre). False when it is neither a known name nor a number; the unit is
- * then the metre. */
+/* The unit of this name ("" and NULL are the metre). False when it is neither a known name nor a number; the unit
+ * is then the metre. */
 bool import_unit_parse(const char *text, import_unit *unit);
 /* The named unit of that many metres, within what a file's rounding may have done to it, else a plain number. */
 import_unit import_unit_of_metres(double metres);
@@ -63,7 +62,19 @@ typedef struct import_samples {
 
 void import_samples_free(import_samples *samples);
 /* Value n as a double. Exact but for I64 beyond 2^53. */
-double import_samples_at(const import_samples *samples, size_t n);
+static inline double import_samples_at(const import_samples *samples, size_t n) {
+    switch (samples->kind) {
+    case IMPORT_I32:
+        return ((const int32_t *)samples->values)[n];
+    case IMPORT_I64:
+        return (double)((const int64_t *)samples->values)[n];
+    case IMPORT_F32:
+        return (double)((const float *)samples->values)[n];
+    case IMPORT_F64:
+        break;
+    }
+    return ((const double *)samples->values)[n];
+}
 
 /* ------------------------------------------------------------------------------------------------ survey.c --
  * What the valid values are like: extremes, how often they occur, and the next value inwards. */
@@ -88,12 +99,12 @@ typedef struct import_heights {
     int32_t min_q, max_q;
 } import_heights;
 
-/* How values become heights. Integers stay what they are: unit says what one is worth. Others are metres already, and
- * are rounded to a quantum. */
+/* How values become heights. Integers stay what they are: unit says what one is worth. Others are metres already,
+ * and are rounded to a quantum. */
 typedef struct import_scheme {
-    rqt_unit unit;       /* of integer kinds: scale, numerator, denominator, offset; the rest is chosen */
-    bool single;         /* a value counts as met when it is equal as a float (32 bits), not as a double */
-    double quantum;      /* metres, 0: chosen */
+    rqt_unit unit;  /* of integer kinds: scale, numerator, denominator, offset; the rest is chosen */
+    bool single;    /* a value counts as met when it is equal as a float (32 bits), not as a double */
+    double quantum; /* metres, 0: chosen */
 } import_scheme;
 
 /* samples is empty afterwards, whatever the result. */

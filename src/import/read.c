@@ -1,9 +1,10 @@
 /* read.c - GDAL windows -> values and validity of the whole grid.
  *
- * A source is read in strips of whole rows, as tall as GDAL's own blocks or taller, so that every compressed block is
- * decoded once; each strip is then merged into the grid, turned north-up and west-first on the way. A sample is void when it
- * is a declared or given nodata value, NaN, or masked. A void never replaces data; data replaces earlier data, and while
- * that happens bits in `valid` remember it, so that three sources over one place count it once.
+ * A source is read in strips of whole rows, as tall as GDAL's own blocks or taller, so that every compressed block
+ * is decoded once; each strip is then merged into the grid, turned north-up and west-first on the way. A sample is
+ * void when it is a declared or given nodata value, NaN, or masked. A void never replaces data; data replaces
+ * earlier data, and while that happens bits in `valid` remember it, so that three sources over one place count it
+ * once.
  */
 #include "source.h"
 
@@ -43,8 +44,8 @@ typedef struct voids {
 } voids;
 
 static void voids_add(voids *v, const import_source *s, double value, int64_t integer) {
-    /* A nodata value has been through decimal text: in float32 it may be an ulp or two off, as GDAL has it; one as large as
-     * the largest floats is often cut to a few digits, and no height is that large. */
+    /* A nodata value has been through decimal text: in float32 it may be an ulp or two off, as GDAL has it; one as
+     * large as the largest floats is often cut to a few digits, and no height is that large. */
     double slack = s->is_float && s->is_single ? 4 * (double)FLT_EPSILON * fabs(value) : 0;
     if (fabs(value) > 1e30 && isfinite(value)) slack = 1e-5 * fabs(value);
     v->value[v->count] = value;
@@ -186,8 +187,8 @@ static bool read_strips(const reading *r, const import_source *s, GDALRasterBand
     for (int32_t top = 0; top < s->height; top += (int32_t)tall) {
         int rows = s->height - top < (int32_t)tall ? s->height - top : (int32_t)tall;
         CPLErrorReset();
-        CPLErr failed = GDALRasterIO(band, GF_Read, 0, top, s->width, rows, strip, s->width, rows,
-                                     types[r->grid->kind], 0, 0);
+        CPLErr failed =
+            GDALRasterIO(band, GF_Read, 0, top, s->width, rows, strip, s->width, rows, types[r->grid->kind], 0, 0);
         if (failed == CE_None && mask_band)
             failed = GDALRasterIO(mask_band, GF_Read, 0, top, s->width, rows, mask, s->width, rows, GDT_Byte, 0, 0);
         if (failed != CE_None)
@@ -199,8 +200,9 @@ static bool read_strips(const reading *r, const import_source *s, GDALRasterBand
             int32_t infinite = merge_row(&m, strip + (size_t)y * (size_t)s->width * element,
                                          mask_band ? mask + (size_t)y * (size_t)s->width : NULL);
             if (infinite >= 0)
-                return import_refuse(r->job, "%s: the height at column %d, row %d is infinite; if infinity marks voids "
-                                             "there, say --nodata inf (or -inf)",
+                return import_refuse(r->job,
+                                     "%s: the height at column %d, row %d is infinite; if infinity marks voids "
+                                     "there, say --nodata inf (or -inf)",
                                      s->path, infinite, from);
         }
         double done = (double)(r->before + (int64_t)(top + rows) * s->width) / (double)r->total;
@@ -214,8 +216,8 @@ static bool read_source(const reading *r, const import_source *s, int32_t column
     char *strip = malloc(n * import_kind_bytes(r->grid->kind));
     uint8_t *mask = s->has_mask ? malloc(n) : NULL;
     CPLErrorReset();
-    GDALDatasetH dataset = GDALOpenEx(s->opened, GDAL_OF_RASTER | GDAL_OF_READONLY | GDAL_OF_VERBOSE_ERROR, NULL, NULL,
-                                      NULL);
+    GDALDatasetH dataset =
+        GDALOpenEx(s->opened, GDAL_OF_RASTER | GDAL_OF_READONLY | GDAL_OF_VERBOSE_ERROR, NULL, NULL, NULL);
     bool ok = false;
     if (!strip || (s->has_mask && !mask))
         import_no_memory(r->job, "reading a source");
@@ -249,7 +251,8 @@ static void settle(import_samples *grid) {
 bool import_read(const import_job *job, const import_source *sources, int count, const import_mosaic *mosaic,
                  import_samples *samples) {
     size_t n = (size_t)mosaic->lattice.width * (size_t)mosaic->lattice.height;
-    *samples = (import_samples){.kind = mosaic->kind, .width = mosaic->lattice.width, .height = mosaic->lattice.height};
+    *samples =
+        (import_samples){.kind = mosaic->kind, .width = mosaic->lattice.width, .height = mosaic->lattice.height};
     samples->values = calloc(n, import_kind_bytes(mosaic->kind));
     samples->valid = calloc(n, 1);
     if (!samples->values || !samples->valid) return import_no_memory(job, "reading the sources");
@@ -263,24 +266,12 @@ bool import_read(const import_job *job, const import_source *sources, int count,
     return true;
 }
 
-size_t import_kind_bytes(import_kind kind) { return kind == IMPORT_I32 || kind == IMPORT_F32 ? 4 : 8; }
+size_t import_kind_bytes(import_kind kind) {
+    return kind == IMPORT_I32 || kind == IMPORT_F32 ? 4 : 8;
+}
 
 void import_samples_free(import_samples *samples) {
     free(samples->values);
     free(samples->valid);
     *samples = (import_samples){0};
-}
-
-double import_samples_at(const import_samples *samples, size_t n) {
-    switch (samples->kind) {
-    case IMPORT_I32:
-        return ((const int32_t *)samples->values)[n];
-    case IMPORT_I64:
-        return (double)((const int64_t *)samples->values)[n];
-    case IMPORT_F32:
-        return (double)((const float *)samples->values)[n];
-    case IMPORT_F64:
-        break;
-    }
-    return ((const double *)samples->values)[n];
 }

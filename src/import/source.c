@@ -1,9 +1,10 @@
 /* source.c - one raster, described or refused.
  *
- * A description is everything that can be known without reading samples. Whatever makes a raster no terrain of ours is
- * refused here with a sentence that begins with its path: not there, not a raster, several bands, complex numbers, rotated,
- * no cell size. The dataset is closed again: read.c opens it when its turn comes.
+ * A description is everything that can be known without reading samples. Whatever makes a raster no terrain of ours
+ * is refused here with a sentence that begins with its path: not there, not a raster, several bands, complex
+ * numbers, rotated, no cell size. The dataset is closed again: read.c opens it when its turn comes.
  */
+#define _LARGEFILE64_SOURCE /* VSIStatBufL is a struct stat64 */
 #include "source.h"
 
 #include <cpl_conv.h>
@@ -23,8 +24,8 @@ static GDALDatasetH dataset_open(const char *path) {
     return GDALOpenEx(path, GDAL_OF_RASTER | GDAL_OF_READONLY | GDAL_OF_VERBOSE_ERROR, NULL, NULL, NULL);
 }
 
-/* A .zip that GDAL does not open as it is (it does open .hgt.zip): the one raster inside. NULL with the sentence when
- * there is none or a choice. */
+/* A .zip that GDAL does not open as it is (it does open .hgt.zip): the one raster inside. NULL with the sentence
+ * when there is none or a choice. */
 static GDALDatasetH archive_open(const import_job *job, const char *path, char **opened) {
     GDALDatasetH found = NULL;
     char *archive = CPLStrdup(CPLSPrintf("/vsizip/{%s}", path));
@@ -34,7 +35,8 @@ static GDALDatasetH archive_open(const import_job *job, const char *path, char *
         size_t length = strlen(*member);
         if (!length || (*member)[length - 1] == '/') continue;
         char *inside = CPLStrdup(CPLSPrintf("%s/%s", archive, *member));
-        GDALDatasetH dataset = GDALIdentifyDriverEx(inside, GDAL_OF_RASTER, NULL, NULL) ? dataset_open(inside) : NULL;
+        GDALDatasetH dataset =
+            GDALIdentifyDriverEx(inside, GDAL_OF_RASTER, NULL, NULL) ? dataset_open(inside) : NULL;
         if (dataset && GDALGetRasterCount(dataset) > 0 && ++rasters == 1) {
             found = dataset;
             *opened = strdup(inside);
@@ -88,8 +90,8 @@ static GDALDatasetH source_open(const import_job *job, const char *path, char **
     return dataset;
 }
 
-/* Place of the north-west sample and the order of rows and columns. A geotransform speaks of pixel corners (GDAL has
- * moved rasters whose pixels are points), samples sit at pixel centres. */
+/* Place of the north-west sample and the order of rows and columns. A geotransform speaks of pixel corners (GDAL
+ * has moved rasters whose pixels are points), samples sit at pixel centres. */
 static bool describe_place(const import_job *job, GDALDatasetH dataset, import_source *s) {
     double g[6] = {0, 1, 0, 0, 0, 1};
     static const double none[6] = {0, 1, 0, 0, 0, 1};
@@ -98,18 +100,19 @@ static bool describe_place(const import_job *job, GDALDatasetH dataset, import_s
     if (!s->placed) {
         s->placement = (rqt_placement){0, 0, 1, -1};
         if (GDALGetGCPCount(dataset) > 0)
-            import_notice(job, "%s has ground control points and no geotransform: samples are placed by column and row",
+            import_notice(job,
+                          "%s has ground control points and no geotransform: samples are placed by column and row",
                           s->path);
         return true;
     }
     for (int i = 0; i < 6; i++)
         if (!isfinite(g[i])) return import_refuse(job, "%s: its geotransform is not finite", s->path);
     if (fabs(g[2]) * s->height > ROTATION_SLACK * fabs(g[1]) || fabs(g[4]) * s->width > ROTATION_SLACK * fabs(g[5]))
-        return import_refuse(job, "%s is rotated (its geotransform has the terms %g and %g); resample it first, for "
-                                  "example with gdalwarp",
+        return import_refuse(job,
+                             "%s is rotated (its geotransform has the terms %g and %g); resample it first, for "
+                             "example with gdalwarp",
                              s->path, g[2], g[4]);
-    if (g[1] == 0 || g[5] == 0)
-        return import_refuse(job, "%s: its cell size is 0 (%g x %g)", s->path, g[1], g[5]);
+    if (g[1] == 0 || g[5] == 0) return import_refuse(job, "%s: its cell size is 0 (%g x %g)", s->path, g[1], g[5]);
     s->flip_columns = g[1] < 0;
     s->flip_rows = g[5] > 0;
     double x = g[0] + g[1] / 2, y = g[3] + g[5] / 2;
@@ -122,7 +125,8 @@ static bool describe_place(const import_job *job, GDALDatasetH dataset, import_s
 static bool describe_type(const import_job *job, GDALRasterBandH band, import_source *s) {
     s->type = GDALGetRasterDataType(band);
     if (GDALDataTypeIsComplex(s->type))
-        return import_refuse(job, "%s has complex numbers (%s), heights are real", s->path, GDALGetDataTypeName(s->type));
+        return import_refuse(job, "%s has complex numbers (%s), heights are real", s->path,
+                             GDALGetDataTypeName(s->type));
     int bits = GDALGetDataTypeSizeBits(s->type);
     s->is_float = GDALDataTypeIsFloating(s->type) != 0;
     if (!s->is_float && !GDALDataTypeIsInteger(s->type))
@@ -156,7 +160,8 @@ static bool describe_unit(const import_job *job, GDALRasterBandH band, import_so
         double metres = s->crs && OSRIsCompound(s->crs) ? OSRGetTargetLinearUnits(s->crs, "VERT_CS", NULL) : 1;
         if (isfinite(metres) && metres > 0) s->unit = import_unit_of_metres(metres);
         if (s->unit.plain != 1 || s->unit.numerator != 1)
-            import_notice(job, "%s: its heights are in the unit of its vertical CRS, %.10g m (--unit says otherwise)",
+            import_notice(job,
+                          "%s: its heights are in the unit of its vertical CRS, %.10g m (--unit says otherwise)",
                           s->path, metres);
     }
     return true;
@@ -199,7 +204,8 @@ bool import_source_describe(const import_job *job, const char *path, import_sour
         import_refuse(job, "%s holds no raster band%s", path,
                       parts ? " of its own; name one of its subdatasets (gdalinfo lists them)" : "");
     } else if (bands > 1) {
-        import_refuse(job, "%s has %d bands; a terrain is one band (pick it with gdal_translate -b N)", path, bands);
+        import_refuse(job, "%s has %d bands; a terrain is one band (pick it with gdal_translate -b N)", path,
+                      bands);
     } else {
         GDALRasterBandH band = GDALGetRasterBand(dataset, 1);
         s->width = GDALGetRasterXSize(dataset);

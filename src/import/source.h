@@ -1,4 +1,5 @@
-/* source.h - one raster, described. Opened again for reading, so that a thousand tiles need no thousand open files. */
+/* source.h - one raster, described. Opened again for reading, so that a thousand tiles need no thousand open files.
+ */
 #ifndef RQT_IMPORT_SOURCE_H
 #define RQT_IMPORT_SOURCE_H
 
@@ -16,8 +17,8 @@ typedef struct import_source {
     bool is_wide;             /* an integer that int32 does not hold */
     bool is_signed_byte;      /* GDAL before 3.7 calls int8 Byte, with a note */
     int32_t width, height;
-    int32_t block_rows; /* rows that GDAL likes to read at once */
-    bool placed;        /* has a geotransform */
+    int32_t block_rows;           /* rows that GDAL likes to read at once */
+    bool placed;                  /* has a geotransform */
     bool flip_rows, flip_columns; /* file order to north-first, west-first */
     rqt_placement placement;      /* of the north-west sample; dx > 0, dy < 0 */
     OGRSpatialReferenceH crs;     /* NULL: none */
@@ -43,7 +44,7 @@ typedef struct import_crs {
     char *vertical; /* "" for none */
     int32_t srid;   /* EPSG code of the horizontal part, 0 for none */
     bool lonlat, wgs84;
-    double metres;  /* of ground, in one unit of the coordinates; along the equator where they are angles */
+    double metres; /* of ground, in one unit of the coordinates; along the equator where they are angles */
 } import_crs;
 
 bool import_crs_describe(OGRSpatialReferenceH crs, import_crs *out); /* false: no memory */

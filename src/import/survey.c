@@ -1,5 +1,5 @@
-/* survey.c - one look at the values before they become heights: their range decides the quantum, and an extreme that stands
- * apart from everything else is most likely the mark of voids that nobody declared. */
+/* survey.c - one look at the values before they become heights: their range decides the quantum, and an extreme
+ * that stands apart from everything else is most likely the mark of voids that nobody declared. */
 #include "parts.h"
 
 #include <math.h>

@@ -13,7 +13,7 @@
 enum {
     MANTISSA_BITS = 53, /* of a double */
     NARROW_BOX_LIMIT =
-        1 << 28 /* boxes with fewer cells than this keep all numerators in 64 bits, see measure_triangle */
+        1 << 20 /* boxes with fewer cells than this keep all numerators in 64 bits, see measure_triangle */
 };
 
 /* The largest deviation seen so far: numerator / denominator quanta, at an index of the window. */
@@ -75,8 +75,9 @@ static bool prepare_triangle(const verify_triangle *triangle, prepared_triangle 
     int64_t first_col = least(a->col, least(b->col, c->col));
     int64_t last_col = most(a->col, most(b->col, c->col));
     /* In a box of w by h cells D <= w * h, |slope_x| < 2^32 * h, |slope_y| < 2^32 * w, and an offset is at most w
-     * or h. So with w * h < 2^28 each product below is under 2^60 for a slope and under 2^61 for D * (q - qa),
-     * where q is any 32-bit number, and a sum of three of them is under 2^63. */
+     * or h. So each product below is under 2^32 * w * h for a slope, and also for D * (q - qa), where q is any
+     * 32-bit number; a sum of three stays in 64 bits up to w * h = 2^29. The limit is far lower so that 128 bits
+     * are not a rarity that only a window of gigabytes, and no test, would ever see. */
     p->narrow = (last_col - first_col) * (p->last_row - p->first_row) < NARROW_BOX_LIMIT;
     return true;
 }

@@ -1,0 +1,38 @@
+-- One row a terrain. Heights are integers q: metres = ((double)z0 + q / (double)d) * f + height_offset with
+-- f = scale * unit_numerator / unit_denominator. Sample (col,row) is at (x0 + col*dx, y0 + row*dy); row 0 is the north.
+-- Its blocks are in rqt_block_ID, their index in rqt_index_ID (terrain.sql). complete = 0: an import that did not finish.
+CREATE TABLE IF NOT EXISTS rqt_terrain (
+  id INTEGER PRIMARY KEY AUTOINCREMENT,
+  name TEXT NOT NULL UNIQUE,
+  format INTEGER NOT NULL,
+  complete INTEGER NOT NULL,
+  width INTEGER NOT NULL,
+  height INTEGER NOT NULL,
+  k INTEGER NOT NULL,
+  x0 REAL NOT NULL,
+  y0 REAL NOT NULL,
+  dx REAL NOT NULL,
+  dy REAL NOT NULL,
+  z0 INTEGER NOT NULL,
+  d INTEGER NOT NULL,
+  unit_numerator INTEGER NOT NULL,
+  unit_denominator INTEGER NOT NULL,
+  scale REAL NOT NULL,
+  height_offset REAL NOT NULL,
+  quantum_error REAL NOT NULL,
+  cell REAL NOT NULL,
+  void_tol REAL NOT NULL,
+  srid INTEGER NOT NULL,
+  lonlat INTEGER NOT NULL,
+  wgs84 INTEGER NOT NULL,
+  crs TEXT NOT NULL,
+  vertical TEXT NOT NULL,
+  source TEXT NOT NULL,
+  created TEXT NOT NULL,
+  voids INTEGER NOT NULL,
+  min_q INTEGER NOT NULL,
+  max_q INTEGER NOT NULL,
+  blocks INTEGER NOT NULL,
+  bytes INTEGER NOT NULL,
+  max_error INTEGER NOT NULL
+);

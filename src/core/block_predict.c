@@ -1,0 +1,244 @@
+/* block_predict.c - the predictors of the block codec (FORMAT.md, "Heights" and "Errors").
+ *
+ * Both were chosen by measuring real terrain, for size first and then for speed. A height is its left neighbour
+ * plus what the row above says about the slope; so all but one addition per height is independent of the row's
+ * other heights. Errors go from fine to coarse, as they are made: a vertex errs at least as much as its children,
+ * and at least as much as it differs from the midpoint of its diamond, which for most vertices is the whole truth.
+ *
+ * Each scale q of the lattice splits the grid into pairs of rows. In units of q, and with even positions belonging
+ * to the next coarser scale:
+ *
+ *        E---H---E---H---E     H and V are the sides: midpoints of an edge between two E
+ *        |   |   |   |   |     C are the centres: children of theirs are none here, of H and V the C of half the
+ * scale V---C---V---C---V |   |   |   |   | E---H---E---H---E
+ *
+ * Rows of E, H, V and C are kept apart, so that every loop runs over neighbours in memory. All arithmetic is on
+ * unsigned integers, or floats that are rounded once per operation: the same on every machine. */
+#include "block_predict.h"
+
+#include <float.h>
+#include <math.h>
+
+_Static_assert(FLT_EVAL_METHOD == 0, "predictions are stored: float must be float");
+
+/* What the row above adds to the left neighbour: a quarter of 2*(N - NW) + (NE - NW), rounded down. Differences
+ * wrap around; for heights that far apart the prediction is poor, but the same for writer and reader. */
+static inline uint32_t slope(uint32_t nw, uint32_t n, uint32_t ne) {
+    return (uint32_t)((int32_t)(2 * n + ne - 3 * nw) >> 2);
+}
+
+void predict_height_row(const int32_t *row, const int32_t *above, int32_t width, uint32_t *residual) {
+    const uint32_t *r = (const uint32_t *)row, *a = (const uint32_t *)above;
+    residual[0] = zigzag32(r[0] - (a ? a[0] : 0));
+    if (!a) {
+        for (int32_t x = 1; x < width; x++) residual[x] = zigzag32(r[x] - r[x - 1]);
+        return;
+    }
+    for (int32_t x = 1; x < width - 1; x++)
+        residual[x] = zigzag32(r[x] - r[x - 1] - slope(a[x - 1], a[x], a[x + 1]));
+    if (width > 1) {
+        int32_t x = width - 1;
+        residual[x] = zigzag32(r[x] - r[x - 1] - slope(a[x - 1], a[x], a[x]));
+    }
+}
+
+uint32_t restore_height_row(const uint32_t *residual, const int32_t *above, int32_t width, int32_t *row) {
+    uint32_t *r = (uint32_t *)row;
+    const uint32_t *a = (const uint32_t *)above;
+    const uint32_t largest = RQT_HEIGHT_LIMIT - 1;
+    if (!a) {
+        for (int32_t x = 0; x < width; x++) r[x] = unzigzag32(residual[x]);
+    } else {
+        r[0] = unzigzag32(residual[0]) + a[0];
+        for (int32_t x = 1; x < width - 1; x++) r[x] = unzigzag32(residual[x]) + slope(a[x - 1], a[x], a[x + 1]);
+        if (width > 1) {
+            int32_t x = width - 1;
+            r[x] = unzigzag32(residual[x]) + slope(a[x - 1], a[x], a[x]);
+        }
+    }
+    uint32_t sum = 0, bad = 0;
+    for (int32_t x = 0; x < width; x++) r[x] = sum += r[x];
+    for (int32_t x = 0; x < width; x++) bad |= (r[x] + largest) | (largest - r[x]);
+    return bad;
+}
+
+/* ---------------------------------------------------------------------------------------------- errors */
+
+/* The code nearest above a float >= 0: 8 significant bits are the top 16 of its bits, with another bias. */
+static inline rqt_code code_near_above(float v) {
+    uint32_t bits;
+    memcpy(&bits, &v, 4);
+    uint32_t code = ((bits + 0xFFFF) >> 16) + ((263 - 7 - 127) << 7);
+    return (rqt_code)(bits ? code : 0);
+}
+
+/* What z differs from the midpoint of a and b: |2z - a - b| times half, as a code. */
+static inline rqt_code midpoint_code(int32_t z, int32_t a, int32_t b, float half) {
+    uint32_t twice = 2 * (uint32_t)z - (uint32_t)a - (uint32_t)b;
+    return code_near_above(fabsf((float)(int32_t)twice) * half);
+}
+
+static inline rqt_code larger(rqt_code a, rqt_code b) {
+    return a > b ? a : b;
+}
+
+/* Half a quantum, less one part in 2^20: so that a product that is a code itself, and that rounding has lifted a
+ * little, gives this code and not the next. Kept where no product overflows or denormalises. */
+static float half_of(double quantum) {
+    double half = quantum * (0.5 - 0x1p-21);
+    return (float)(half < 0x1p-90 ? 0x1p-90 : half > 0x1p90 ? 0x1p90 : half);
+}
+
+/* One row of codes or residuals, whichever is asked for. */
+static inline void settle(bool restoring, const rqt_code *prediction, int n, rqt_code *code, uint16_t *residual) {
+    if (restoring)
+        for (int i = 0; i < n; i++) code[i] = (rqt_code)(prediction[i] + unzigzag16(residual[i]));
+    else
+        for (int i = 0; i < n; i++) residual[i] = zigzag16((uint16_t)(code[i] - prediction[i]));
+}
+
+/* Every second element: of n + 1 + n, the even ones and the odd ones. */
+static inline void split(const int32_t *row, int n, int32_t *even, int32_t *odd) {
+    for (int i = 0; i < n; i++) {
+        even[i] = row[2 * i];
+        odd[i] = row[2 * i + 1];
+    }
+    even[n] = row[2 * n];
+}
+
+/* Raise the predictions of n sides of one row to their children's codes: two rows (NULL beyond the block) of 2n
+ * centres of half the scale. The children of side i of an H row are the centres 2i and 2i+1. */
+static void raise_h(rqt_code *prediction, int n, const rqt_code *centres) {
+    if (!centres) return;
+    for (int i = 0; i < n; i++) prediction[i] = larger(prediction[i], larger(centres[2 * i], centres[2 * i + 1]));
+}
+
+/* The same for the n + 1 sides of a V row: the children of side i are the centres 2i-1 and 2i. */
+static void raise_v(rqt_code *prediction, int n, const rqt_code *centres) {
+    prediction[0] = larger(prediction[0], centres[0]);
+    for (int i = 1; i < n; i++) prediction[i] = larger(prediction[i], larger(centres[2 * i - 1], centres[2 * i]));
+    prediction[n] = larger(prediction[n], centres[2 * n - 1]);
+}
+
+/* One scale. The grid of heights has 2n + 1 rows and columns (stride between rows), n > 0; centres are those of
+ * half the scale, 2n rows of 2n, or NULL at the finest. code and residual: H, V, H, V .. H, then the rows of C.
+ * Writes every second row and column of heights to next. */
+static void code_scale_of_errors(bool restoring, const int32_t *heights, int stride, int n, const rqt_code *centres,
+                                 float half, rqt_code *code, uint16_t *residual, int32_t *next) {
+    enum { HALF_N = LARGEST_N / 2 + 1 };
+    int32_t even[HALF_N], odd[HALF_N];
+    rqt_code p[HALF_N];
+    const ptrdiff_t pair = 2 * n + 1, first_centre = pair * n + n;
+    for (int j = 0; j <= n; j++) {
+        int32_t *e = next + (ptrdiff_t)j * (n + 1);
+        split(heights + (ptrdiff_t)2 * j * stride, n, e, odd);
+        for (int i = 0; i < n; i++) p[i] = midpoint_code(odd[i], e[i], e[i + 1], half);
+        if (centres) {
+            raise_h(p, n, j > 0 ? centres + (ptrdiff_t)(2 * j - 1) * 2 * n : NULL);
+            raise_h(p, n, j < n ? centres + (ptrdiff_t)(2 * j) * 2 * n : NULL);
+        }
+        settle(restoring, p, n, code + j * pair, residual + j * pair);
+    }
+    for (int j = 0; j < n; j++) {
+        const int32_t *above = next + (ptrdiff_t)j * (n + 1), *below = above + n + 1;
+        rqt_code *h = code + j * pair, *v = h + n, *c = code + first_centre + (ptrdiff_t)j * n;
+        split(heights + (ptrdiff_t)(2 * j + 1) * stride, n, even, odd);
+        for (int i = 0; i <= n; i++) p[i] = midpoint_code(even[i], above[i], below[i], half);
+        if (centres) {
+            raise_v(p, n, centres + (ptrdiff_t)(2 * j) * 2 * n);
+            raise_v(p, n, centres + (ptrdiff_t)(2 * j + 1) * 2 * n);
+        }
+        settle(restoring, p, n + 1, v, residual + j * pair + n);
+        /* The diagonal goes from above left where i and j are both even or both odd. The block's only centre has
+         * the diagonal of its place in the lattice, which is not known here: it makes do with its children. */
+        if (n == 1) {
+            p[0] = 0;
+        } else {
+            for (int i = 0; i < n; i++) {
+                bool other = (i ^ j) & 1;
+                p[i] =
+                    midpoint_code(odd[i], other ? above[i + 1] : above[i], other ? below[i] : below[i + 1], half);
+            }
+        }
+        const rqt_code *h_below = h + pair;
+        for (int i = 0; i < n; i++) p[i] = larger(p[i], larger(larger(h[i], h_below[i]), larger(v[i], v[i + 1])));
+        settle(restoring, p, n, c, residual + (c - code));
+    }
+}
+
+static void code_errors(bool restoring, error_scratch *s, int k, const int32_t *q, double quantum) {
+    const float half = half_of(quantum);
+    const rqt_code corner_prediction[4] = {0};
+    const int32_t *heights = q;
+    const rqt_code *centres = NULL;
+    rqt_code *code = s->code;
+    uint16_t *residual = s->residual;
+    int stride = (1 << k) + 1;
+    for (int n = 1 << k >> 1, scale = 0; n > 0; n >>= 1, scale++) {
+        int32_t *next = s->heights[scale & 1];
+        code_scale_of_errors(restoring, heights, stride, n, centres, half, code, residual, next);
+        ptrdiff_t coded = (ptrdiff_t)n * (3 * n + 2);
+        centres = code + (coded - (ptrdiff_t)n * n);
+        code += coded;
+        residual += coded;
+        heights = next;
+        stride = n + 1;
+    }
+    settle(restoring, corner_prediction, 4, code, residual);
+}
+
+/* From rows to coding order, finest scale first. */
+void predict_errors(error_scratch *s, int k, const int32_t *q, double quantum, const rqt_code *error) {
+    const rqt_code *grid = error;
+    rqt_code *code = s->code;
+    for (int n = 1 << k >> 1, scale = 0; n > 0; n >>= 1, scale++) {
+        rqt_code *next = s->grid[scale & 1], *c = code + (ptrdiff_t)2 * n * (n + 1);
+        for (int j = 0; j <= n; j++) {
+            for (int i = 0; i < n; i++) {
+                *next++ = grid[2 * i];
+                *code++ = grid[2 * i + 1];
+            }
+            *next++ = grid[2 * n];
+            grid += 2 * n + 1;
+            if (j == n) break;
+            for (int i = 0; i < n; i++) {
+                *code++ = grid[2 * i];
+                *c++ = grid[2 * i + 1];
+            }
+            *code++ = grid[2 * n];
+            grid += 2 * n + 1;
+        }
+        code = c;
+        grid = s->grid[scale & 1];
+    }
+    memcpy(code, grid, 4 * sizeof *code);
+    code_errors(false, s, k, q, quantum);
+}
+
+static void merge(rqt_code *row, int n, const rqt_code *even, const rqt_code *odd) {
+    for (int i = 0; i < n; i++) {
+        row[2 * i] = even[i];
+        row[2 * i + 1] = odd[i];
+    }
+    row[2 * n] = even[n];
+}
+
+/* And back: from coding order to rows, coarsest scale first. */
+void restore_errors(error_scratch *s, int k, const int32_t *q, double quantum, rqt_code *error) {
+    code_errors(true, s, k, q, quantum);
+    const int side = (1 << k) + 1;
+    const rqt_code *end = s->code + (ptrdiff_t)side * side - 4, *coarse = end;
+    if (k == 0) memcpy(error, end, 4 * sizeof *error);
+    for (int n = 1; n < side - 1; n *= 2) {
+        rqt_code *grid = 2 * n == side - 1 ? error : s->grid[coarse == s->grid[0]];
+        const ptrdiff_t pair = 2 * n + 1;
+        end -= (ptrdiff_t)n * (3 * n + 2);
+        const rqt_code *c = end + (ptrdiff_t)2 * n * (n + 1);
+        for (int j = 0; j <= n; j++) {
+            rqt_code *row = grid + 2 * j * pair;
+            merge(row, n, coarse + (ptrdiff_t)j * (n + 1), end + j * pair);
+            if (j < n) merge(row + pair, n, end + j * pair + n, c + (ptrdiff_t)j * n);
+        }
+        coarse = grid;
+    }
+}

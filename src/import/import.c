@@ -1,0 +1,333 @@
+/* import.c - the whole: options, sources, probe, samples, heights, errors, blocks.
+ *
+ * The order is chosen by price: what can be refused without samples is refused before one is read, and the database
+ * is only locked, and only created, when everything that goes into it is there.
+ */
+#include "source.h"
+
+#include <cpl_conv.h>
+#include <cpl_error.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+#define GDAL_CACHE_BYTES ((GIntBig)64 << 20)
+#define MIB 1048576.0
+
+/* ------------------------------------------------------------------------------ what the parts call back -- */
+bool import_refuse(const import_job *job, const char *format, ...) {
+    va_list list;
+    va_start(list, format);
+    if (job->message && job->message_size) vsnprintf(job->message, job->message_size, format, list);
+    va_end(list);
+    return false;
+}
+
+bool import_no_memory(const import_job *job, const char *what) {
+    return import_refuse(job, "out of memory while %s", what);
+}
+
+void import_notice(const import_job *job, const char *format, ...) {
+    if (!job->options->notice) return;
+    char sentence[1024];
+    va_list list;
+    va_start(list, format);
+    vsnprintf(sentence, sizeof sentence, format, list);
+    va_end(list);
+    job->options->notice(job->options->context, sentence);
+}
+
+bool import_progress(const import_job *job, const char *stage, double done, int64_t samples) {
+    const import_options *o = job->options;
+    if (!o->progress || o->progress(o->context, stage, done, samples)) return true;
+    return import_refuse(job, "stopped while %s; the database is as it was",
+                         !strcmp(stage, "reading")  ? "reading"
+                         : !strcmp(stage, "errors") ? "computing errors"
+                                                    : "writing blocks");
+}
+
+static void *resize(void *context, void *p, size_t bytes) {
+    (void)context;
+    if (bytes) return realloc(p, bytes);
+    free(p);
+    return NULL;
+}
+
+const rqt_allocator *import_allocator(void) {
+    static const rqt_allocator allocator = {resize, NULL};
+    return &allocator;
+}
+
+const char *import_gdal_version(void) {
+    return GDALVersionInfo("RELEASE_NAME");
+}
+
+void import_options_init(import_options *options) {
+    long cores = sysconf(_SC_NPROCESSORS_ONLN), pages = sysconf(_SC_PHYS_PAGES), page = sysconf(_SC_PAGE_SIZE);
+    int64_t half = pages > 0 && page > 0 ? (int64_t)pages * page / 2 : INT64_MAX;
+    *options = (import_options){.k = 6,
+                                .void_tol = 1,
+                                .jobs = cores < 1    ? 1
+                                        : cores > 64 ? 64
+                                                     : (int)cores,
+                                .memory = half < (int64_t)4 << 30 ? half : (int64_t)4 << 30};
+}
+
+/* ------------------------------------------------------------------------------------------------- options -- */
+static bool check_options(const import_job *job, int count) {
+    const import_options *o = job->options;
+    import_unit unit;
+    if (count < 1) return import_refuse(job, "no source to import");
+    if (o->name && !store_name_is_valid(o->name))
+        return import_refuse(job, "'%s' is no name for a terrain: 1 to 63 letters, digits, _ . -", o->name);
+    if (o->k < 1 || o->k > RQT_MAX_BLOCK_K)
+        return import_refuse(job, "blocks of 2^%d + 1 samples a side: the exponent is 1 to %d", o->k,
+                             RQT_MAX_BLOCK_K);
+    if (o->unit && !import_unit_parse(o->unit, &unit))
+        return import_refuse(job, "the unit '%s' is not m, ft, us-ft or a number of metres", o->unit);
+    if (!(o->quantum >= 0 && o->quantum < 1e9))
+        return import_refuse(job, "a quantum of %g is no height step: a positive number", o->quantum);
+    if (!(o->void_tol > 0 && isfinite(o->void_tol)))
+        return import_refuse(job, "a void tolerance of %g: a positive number of metres per metre of eps",
+                             o->void_tol);
+    if (o->jobs < 1 || o->jobs > 1024) return import_refuse(job, "%d jobs: 1 to 1024", o->jobs);
+    return true;
+}
+
+/* The default name: the file name up to its first dot, with _ for what a name may not have. */
+static void name_of(const import_options *o, const import_source *first, char name[64]) {
+    if (o->name) {
+        snprintf(name, 64, "%s", o->name);
+        return;
+    }
+    size_t n = strcspn(first->base, ".");
+    if (n > 63) n = 63;
+    memcpy(name, first->base, n);
+    name[n] = 0;
+    for (size_t i = 0; i < n; i++) {
+        char c = name[i];
+        bool fine =
+            (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
+        if (!fine) name[i] = '_';
+    }
+    if (!n) snprintf(name, 64, "terrain");
+}
+
+/* ------------------------------------------------------------------------------------------------ the whole -- */
+typedef struct import {
+    import_job job;
+    import_source *sources;
+    int count, described;
+    const char *path;
+    import_mosaic mosaic;
+    import_crs crs;
+    int k;
+    import_samples samples;
+    import_heights heights;
+    rqt_grid grid;
+    rqt_void_cost cost;
+    rqt_errors errors;
+    import_database database;
+    import_report *report;
+} import;
+
+static double now(void) {
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
+}
+
+static int64_t sample_count(const import *m) {
+    return (int64_t)m->mosaic.lattice.width * m->mosaic.lattice.height;
+}
+
+/* The most memory that any moment of the import takes. */
+static bool check_memory(const import *m) {
+    double n = (double)sample_count(m), blocks = n / (double)(1 << 2 * m->k) * 2 + 64;
+    double reading = n * (double)import_kind_bytes(m->mosaic.kind) + n +
+                     (double)import_read_bytes(m->sources, m->count) + (double)GDAL_CACHE_BYTES;
+    double writing = n * sizeof(int32_t) + n + (double)rqt_errors_bytes(&m->mosaic.lattice) + blocks * 64 +
+                     (double)import_blocks_bytes(m->k, m->job.options->jobs) + (32 << 20);
+    double need = reading > writing ? reading : writing;
+    if (need <= (double)m->job.options->memory) return true;
+    return import_refuse(&m->job, "%d x %d samples need %.0f MiB of memory to import; --memory allows %.0f",
+                         m->mosaic.lattice.width, m->mosaic.lattice.height, ceil(need / MIB),
+                         floor((double)m->job.options->memory / MIB));
+}
+
+static bool describe(import *m, const char *const *paths) {
+    m->sources = calloc((size_t)m->count, sizeof *m->sources);
+    if (!m->sources) return import_no_memory(&m->job, "describing the sources");
+    for (int i = 0; i < m->count; i++) {
+        m->described = i + 1;
+        if (!import_source_describe(&m->job, paths[i], &m->sources[i])) return false;
+        if (import_source_is_file(&m->sources[i], m->path))
+            return import_refuse(&m->job, "%s is part of the source %s and cannot be the database too", m->path,
+                                 paths[i]);
+    }
+    if (!import_mosaic_plan(&m->job, m->sources, m->count, &m->mosaic)) return false;
+    if (!import_crs_describe(m->sources[0].crs, &m->crs)) return import_no_memory(&m->job, "describing the CRS");
+    m->k = m->job.options->k < m->mosaic.lattice.K ? m->job.options->k : m->mosaic.lattice.K;
+    m->cost =
+        (rqt_void_cost){.cell = import_crs_cell(&m->crs, &m->mosaic.placement), .c = m->job.options->void_tol};
+    return check_memory(m);
+}
+
+static void tell_extreme(const import *m, double value, int64_t times) {
+    const rqt_unit unit = import_source_unit(&m->sources[0]);
+    double raw = m->mosaic.is_metres ? (value - unit.offset) / rqt_unit_factor(&unit) : value;
+    import_notice(
+        &m->job,
+        "%lld samples have the value %.10g, which stands apart from all others: if it marks voids, import "
+        "again with --nodata %.10g",
+        (long long)times, raw, raw);
+}
+
+static bool read_heights(import *m) {
+    import_report *report = m->report;
+    double start = now();
+    if (!import_progress(&m->job, "reading", 0, sample_count(m))) return false;
+    if (!import_read(&m->job, m->sources, m->count, &m->mosaic, &m->samples)) return false;
+    report->samples = sample_count(m);
+    report->voids = m->samples.voids;
+    report->overlap = m->samples.overlap;
+    report->overlap_differs = m->samples.overlap_differs;
+    if (report->overlap_differs > 0)
+        import_notice(&m->job, "%lld of %lld samples that several sources have differ: the later source won",
+                      (long long)report->overlap_differs, (long long)report->overlap);
+    if (report->voids == report->samples) import_notice(&m->job, "every sample is void");
+    import_survey survey;
+    import_survey_take(&m->samples, &survey);
+    if (import_survey_min_is_suspicious(&survey)) tell_extreme(m, survey.min, survey.min_count);
+    if (import_survey_max_is_suspicious(&survey)) tell_extreme(m, survey.max, survey.max_count);
+    if (!import_quantise(&m->job, &m->samples, &survey, &m->mosaic.scheme, &m->heights)) return false;
+    if (!rqt_unit_is_valid(&m->heights.unit))
+        return import_refuse(&m->job, "%s: its unit, scale (%g) and offset (%g) make no heights in metres",
+                             m->sources[0].path, m->sources[0].scale, m->sources[0].offset);
+    m->grid = (rqt_grid){.lattice = m->mosaic.lattice, .q = m->heights.q, .valid = m->heights.valid};
+    report->seconds_read = now() - start;
+    return true;
+}
+
+static bool errors_progress(void *context, double done) {
+    const import *m = context;
+    return import_progress(&m->job, "errors", done, sample_count(m));
+}
+
+static bool compute_errors(import *m) {
+    double start = now();
+    rqt_status status = rqt_errors_compute(&m->grid, &m->heights.unit, &m->cost, import_allocator(),
+                                           errors_progress, m, &m->errors);
+    if (status == RQT_INTERRUPTED) return false;
+    if (status == RQT_NO_MEMORY) return import_no_memory(&m->job, "computing errors");
+    if (status != RQT_OK) return import_refuse(&m->job, "errors cannot be computed (status %d)", (int)status);
+    rqt_errors_saturate(&m->errors);
+    m->report->seconds_errors = now() - start;
+    return true;
+}
+
+static rqt_code largest_error(const rqt_errors *errors) {
+    rqt_code largest = 0;
+    size_t n = (size_t)errors->columns * (size_t)errors->rows;
+    for (size_t i = 0; i < n; i++)
+        if (errors->code[i] != RQT_CODE_INFINITY && errors->code[i] > largest) largest = errors->code[i];
+    return largest;
+}
+
+/* File names, one a line. */
+static char *provenance(const import *m) {
+    size_t size = 1;
+    for (int i = 0; i < m->count; i++) size += strlen(m->sources[i].base) + 1;
+    char *text = malloc(size), *end = text;
+    for (int i = 0; text && i < m->count; i++) end += sprintf(end, "%s%s", i ? "\n" : "", m->sources[i].base);
+    return text;
+}
+
+static bool write_terrain(import *m, store_terrain *info) {
+    const import_job *job = &m->job;
+    rqt_pyramid *pyramid = NULL;
+    store_writer *writer = NULL;
+    char *detail = NULL;
+    double quantum = fabs(rqt_unit_factor(&info->unit)) / info->unit.d;
+    rqt_status status = rqt_pyramid_create(&m->grid, &m->errors, m->k, import_allocator(), &pyramid);
+    if (status != RQT_OK)
+        return status == RQT_NO_MEMORY ? import_no_memory(job, "making blocks")
+                                       : import_refuse(job, "blocks cannot be made (status %d)", (int)status);
+    bool ok = import_database_begin(job, m->path, m->k, &m->database);
+    if (ok) {
+        int code = store_writer_begin(m->database.db, info, job->options->replace, &writer, &detail);
+        if (code != SQLITE_OK) ok = import_database_refuse(job, m->path, code, detail);
+    }
+    ok = ok && import_blocks(job, pyramid, m->k, quantum, writer, m->path, sample_count(m), m->report);
+    if (ok) {
+        int code = store_writer_finish(writer, largest_error(&m->errors), &detail);
+        if (code != SQLITE_OK) ok = import_database_refuse(job, m->path, code, detail);
+    }
+    store_writer_free(writer);
+    rqt_pyramid_free(pyramid);
+    return ok && import_database_commit(job, &m->database);
+}
+
+static bool write_database(import *m) {
+    double start = now();
+    char created[32];
+    time_t seconds = time(NULL);
+    struct tm utc;
+    gmtime_r(&seconds, &utc);
+    strftime(created, sizeof created, "%Y-%m-%dT%H:%M:%SZ", &utc);
+    store_terrain info = {.lattice = m->mosaic.lattice,
+                          .k = m->k,
+                          .placement = m->mosaic.placement,
+                          .unit = m->heights.unit,
+                          .quantum_error = m->heights.quantum_error,
+                          .cost = m->cost,
+                          .srid = m->crs.srid,
+                          .lonlat = m->crs.lonlat,
+                          .wgs84 = m->crs.wgs84,
+                          .crs = m->crs.wkt,
+                          .vertical = m->crs.vertical,
+                          .source = provenance(m),
+                          .created = created,
+                          .voids = m->report->voids,
+                          .min_q = m->heights.min_q,
+                          .max_q = m->heights.max_q};
+    memcpy(info.name, m->report->name, sizeof info.name);
+    bool ok = info.source ? write_terrain(m, &info) : import_no_memory(&m->job, "naming the sources");
+    free(info.source);
+    m->report->seconds_blocks = now() - start;
+    return ok;
+}
+
+int import_run(const char *const *sources, int count, const char *database, const import_options *options,
+               import_report *report, char *message, size_t message_size) {
+import m = {.job = {options, message, message_size }, .count = count, .path = database, .report = report };
+    *report = (import_report){0};
+    if (message && message_size) message[0] = 0;
+    GDALAllRegister();
+    /* GDAL's words belong into our sentences, not onto the terminal. */
+    CPLPushErrorHandler(CPLQuietErrorHandler);
+    GIntBig cache = GDALGetCacheMax64();
+    GDALSetCacheMax64(GDAL_CACHE_BYTES);
+
+    bool ok = check_options(&m.job, count) && describe(&m, sources);
+    if (ok) name_of(options, &m.sources[0], report->name);
+    ok = ok && import_database_probe(&m.job, database, report->name) && read_heights(&m) && compute_errors(&m) &&
+         write_database(&m);
+
+    import_database_close(&m.database);
+    rqt_errors_free(&m.errors, import_allocator());
+    import_samples_free(&m.samples);
+    free(m.heights.q);
+    free(m.heights.valid);
+    import_crs_free(&m.crs);
+    import_mosaic_free(&m.mosaic);
+    for (int i = 0; i < m.described; i++) import_source_free(&m.sources[i]);
+    free(m.sources);
+    GDALSetCacheMax64(cache);
+    CPLPopErrorHandler();
+    return ok ? 0 : 1;
+}

@@ -1,0 +1,198 @@
+/* writer.c - one terrain into a database: its row, its tables, its blocks, and its place in a GeoPackage.
+ *
+ * The caller owns the transaction, so that nothing is ever half there: the row says complete = 0 until the last call,
+ * and a crash before the commit leaves the database as it was.
+ */
+#include "internal.h"
+
+#include "schema_sql.h"
+
+#include <string.h>
+
+struct store_writer {
+    sqlite3 *db;
+    int64_t id;
+    int k;
+    rqt_lattice lattice;
+    int64_t blocks, bytes;
+    sqlite3_stmt *put_block, *put_index;
+};
+
+/* Several statements, one after the other. */
+static int run(sqlite3 *db, const char *sql, char **error, const char *doing) {
+    const int code = sqlite3_exec(db, sql, NULL, NULL, NULL);
+    return code == SQLITE_OK ? SQLITE_OK : store_fail_db(error, db, code, doing);
+}
+
+/* sql with every {N} replaced by the terrain's id. */
+static char *with_id(const char *sql, int64_t id) {
+    sqlite3_str *out = sqlite3_str_new(NULL);
+    for (const char *hole; (hole = strstr(sql, "{N}")) != NULL; sql = hole + 3)
+        sqlite3_str_appendf(out, "%.*s%lld", (int)(hole - sql), sql, id);
+    sqlite3_str_appendall(out, sql);
+    return sqlite3_str_finish(out);
+}
+
+static bool has_table(sqlite3 *db, const char *name) {
+    return sqlite3_table_column_metadata(db, "main", name, NULL, NULL, NULL, NULL, NULL, NULL) == SQLITE_OK;
+}
+
+int store_make_geopackage(sqlite3 *db, char **error) {
+    sqlite3_stmt *s = NULL;
+    int code = sqlite3_prepare_v2(db, "SELECT count(*) FROM main.sqlite_schema", -1, &s, NULL);
+    if (code != SQLITE_OK) return store_fail_db(error, db, code, "reading the database");
+    const bool empty = sqlite3_step(s) == SQLITE_ROW && sqlite3_column_int64(s, 0) == 0;
+    code = sqlite3_finalize(s);
+    if (code != SQLITE_OK) return store_fail_db(error, db, code, "reading the database");
+    return empty ? run(db, sql_geopackage, error, "making a GeoPackage") : SQLITE_OK;
+}
+
+/* A table of ours in gpkg_contents: GIS hosts then list it as a table without geometry, and leave the others alone. */
+static int register_attributes(sqlite3 *db, const char *table, const char *identifier, const char *description,
+                               char **error) {
+    if (!has_table(db, "gpkg_contents")) return SQLITE_OK;
+    char *sql = sqlite3_mprintf("INSERT OR REPLACE INTO main.gpkg_contents(table_name, data_type, identifier, description) "
+                                "VALUES(%Q, 'attributes', %Q, %Q)",
+                                table, identifier, description);
+    if (!sql) return SQLITE_NOMEM;
+    const int code = run(db, sql, error, "registering the terrain in the GeoPackage");
+    sqlite3_free(sql);
+    return code;
+}
+
+static int drop_terrain(sqlite3 *db, int64_t id, char **error) {
+    char *sql = sqlite3_mprintf("DROP TABLE IF EXISTS main.rqt_index_%lld; DROP TABLE IF EXISTS main.rqt_block_%lld; "
+                                "DELETE FROM main.rqt_terrain WHERE id = %lld;",
+                                id, id, id);
+    char *contents = has_table(db, "gpkg_contents")
+                         ? sqlite3_mprintf("DELETE FROM main.gpkg_contents WHERE table_name = 'rqt_block_%lld'", id)
+                         : sqlite3_mprintf("");
+    int code = sql && contents ? run(db, sql, error, "replacing a terrain") : SQLITE_NOMEM;
+    if (code == SQLITE_OK) code = run(db, contents, error, "replacing a terrain");
+    sqlite3_free(sql);
+    sqlite3_free(contents);
+    return code;
+}
+
+/* The id of the terrain of this name, 0 when there is none. */
+static int find_id(sqlite3 *db, const char *name, int64_t *id, char **error) {
+    sqlite3_stmt *s = NULL;
+    *id = 0;
+    int code = sqlite3_prepare_v2(db, "SELECT id FROM main.rqt_terrain WHERE name = ?1", -1, &s, NULL);
+    if (code != SQLITE_OK) return store_fail_db(error, db, code, "looking for the terrain");
+    sqlite3_bind_text(s, 1, name, -1, SQLITE_STATIC);
+    if (sqlite3_step(s) == SQLITE_ROW) *id = sqlite3_column_int64(s, 0);
+    code = sqlite3_finalize(s);
+    return code == SQLITE_OK ? SQLITE_OK : store_fail_db(error, db, code, "looking for the terrain");
+}
+
+static int prepare(store_writer *w, sqlite3_stmt **out, const char *format, char **error) {
+    char *sql = sqlite3_mprintf(format, w->id);
+    if (!sql) return SQLITE_NOMEM;
+    const int code = sqlite3_prepare_v3(w->db, sql, -1, SQLITE_PREPARE_PERSISTENT, out, NULL);
+    sqlite3_free(sql);
+    return code == SQLITE_OK ? SQLITE_OK : store_fail_db(error, w->db, code, "preparing to write blocks");
+}
+
+static int begin(store_writer *w, const store_terrain *info, bool replace, char **error) {
+    if (!store_name_is_valid(info->name))
+        return store_fail(error, SQLITE_ERROR, "%s is no name for a terrain: use 1 to 63 of A-Z a-z 0-9 _ . -", info->name);
+    int code = run(w->db, sql_schema, error, "creating rqt_terrain");
+    if (code == SQLITE_OK)
+        code = register_attributes(w->db, "rqt_terrain", "rqt_terrain", "rqt: one row per terrain", error);
+    int64_t old = 0;
+    if (code == SQLITE_OK) code = find_id(w->db, info->name, &old, error);
+    if (code != SQLITE_OK) return code;
+    if (old && !replace)
+        return store_fail(error, SQLITE_ERROR, "terrain %s exists already; use --replace to replace it", info->name);
+    if (old) code = drop_terrain(w->db, old, error);
+    if (code == SQLITE_OK) code = store_insert_terrain(w->db, info, &w->id, error);
+    if (code != SQLITE_OK) return code;
+    char *sql = with_id(sql_terrain, w->id);
+    code = sql ? run(w->db, sql, error, "creating the terrain's tables") : SQLITE_NOMEM;
+    sqlite3_free(sql);
+    if (code == SQLITE_OK) {
+        char *table = sqlite3_mprintf("rqt_block_%lld", w->id);
+        char *about = sqlite3_mprintf("rqt: blocks of terrain %s, %d x %d samples", info->name, info->lattice.width,
+                                      info->lattice.height);
+        code = table && about ? register_attributes(w->db, table, table, about, error) : SQLITE_NOMEM;
+        sqlite3_free(table);
+        sqlite3_free(about);
+    }
+    if (code == SQLITE_OK)
+        code = prepare(w, &w->put_block, "INSERT INTO main.rqt_block_%lld(id, summary, data) VALUES(?1, ?2, ?3)", error);
+    if (code == SQLITE_OK)
+        code = prepare(w, &w->put_index, "INSERT INTO main.rqt_index_%lld VALUES(?1,?2,?3,?4,?5,?6,?7,?8,?9)", error);
+    return code;
+}
+
+int store_writer_begin(sqlite3 *db, const store_terrain *info, bool replace, store_writer **writer, char **error) {
+    *writer = NULL;
+    store_writer *w = sqlite3_malloc(sizeof *w);
+    if (!w) return SQLITE_NOMEM;
+    *w = (store_writer){.db = db, .k = info->k, .lattice = info->lattice};
+    const int code = begin(w, info, replace, error);
+    if (code != SQLITE_OK)
+        store_writer_free(w);
+    else
+        *writer = w;
+    return code;
+}
+
+#define NEVER 65536 /* an interval that no eps meets */
+
+static bool put_interval(sqlite3_stmt *s, int at, rqt_interval interval) {
+    const bool answers = interval.em < interval.em_parent;
+    sqlite3_bind_int(s, at, answers ? interval.em : NEVER);
+    sqlite3_bind_int(s, at + 1, answers ? interval.em_parent - 1 : NEVER);
+    return answers;
+}
+
+int store_writer_block(store_writer *w, rqt_block_number number, const rqt_summary *summary, const uint8_t *bytes,
+                       size_t size, char **error) {
+    rqt_block_place place;
+    if (rqt_block_locate(&w->lattice, w->k, number, &place) != RQT_OK)
+        return store_fail(error, SQLITE_ERROR, "block %llu is not of this terrain", number);
+    uint8_t encoded[RQT_SUMMARY_BYTES];
+    rqt_summary_encode(summary, encoded);
+    sqlite3_stmt *s = w->put_block;
+    sqlite3_bind_int64(s, 1, (sqlite3_int64)number);
+    sqlite3_bind_blob(s, 2, encoded, sizeof encoded, SQLITE_STATIC);
+    sqlite3_bind_blob64(s, 3, bytes, size, SQLITE_STATIC);
+    sqlite3_step(s);
+    int code = sqlite3_reset(s);
+    sqlite3_clear_bindings(s);
+    if (code != SQLITE_OK) return store_fail_db(error, w->db, code, "writing a block");
+    w->blocks++;
+    w->bytes += (int64_t)size + RQT_SUMMARY_BYTES;
+
+    s = w->put_index;
+    const int32_t last_x = w->lattice.width - 1, last_y = w->lattice.height - 1;
+    sqlite3_bind_int64(s, 1, (sqlite3_int64)number);
+    sqlite3_bind_int(s, 2, place.x);
+    sqlite3_bind_int(s, 3, place.x + place.side < last_x ? place.x + place.side : last_x);
+    sqlite3_bind_int(s, 4, place.y);
+    sqlite3_bind_int(s, 5, place.y + place.side < last_y ? place.y + place.side : last_y);
+    const bool tol = put_interval(s, 6, summary->tol), exact = put_interval(s, 8, summary->exact);
+    if (!tol && !exact) return SQLITE_OK;
+    sqlite3_step(s);
+    code = sqlite3_reset(s);
+    return code == SQLITE_OK ? SQLITE_OK : store_fail_db(error, w->db, code, "writing the index");
+}
+
+int store_writer_finish(store_writer *w, rqt_code max_error, char **error) {
+    char *sql = sqlite3_mprintf("UPDATE main.rqt_terrain SET complete = 1, blocks = %lld, bytes = %lld, max_error = %d "
+                                "WHERE id = %lld",
+                                w->blocks, w->bytes, max_error, w->id);
+    if (!sql) return SQLITE_NOMEM;
+    const int code = run(w->db, sql, error, "completing the terrain");
+    sqlite3_free(sql);
+    return code;
+}
+
+void store_writer_free(store_writer *w) {
+    if (!w) return;
+    sqlite3_finalize(w->put_block);
+    sqlite3_finalize(w->put_index);
+    sqlite3_free(w);
+}

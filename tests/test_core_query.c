@@ -1,0 +1,644 @@
+/* test_core_query.c - what the blocks hold is what the oracle says, and a query over them is the global mesh.
+ *
+ * For one raster the whole pyramid of each legal block size is stored as bytes; windows of every kind at eps on and
+ * beside stored errors are answered from it, with each way of selecting. The oracle walks the whole terrain, keeps
+ * the leaves that meet the window, and the two multisets of triangles must be equal. */
+#include "test_core_database.h"
+
+enum { MOST_SIZES = RQT_MAX_BLOCK_K + 1 };
+
+/* ------------------------------------------------------------------------------------------ blocks -- */
+
+static void check_vertex(const model *m, int x, int y, int32_t q, rqt_code error, uint8_t flags, const char *what) {
+    const oracle_point at = {x, y}, sample = oracle_clamp(&m->o, at);
+    const oracle_node *n = oracle_at(&m->o, x, y);
+    int valid = oracle_is_valid(&m->o, at);
+    int right = (valid ? RQT_VALID : 0) | (n->outline ? RQT_OUTLINE : 0);
+    if (flags != right || error != n->code) raster_print(&m->r);
+    CHECK(flags == right, "%s (%d,%d): flags %d, should be %d", what, x, y, flags, right);
+    CHECK(error == n->code, "%s (%d,%d): error %u, should be %u", what, x, y, error, n->code);
+    if (valid) CHECK(q == m->r.q[sample.y * m->r.width + sample.x], "%s (%d,%d): height %d", what, x, y, (int)q);
+}
+
+/* em of a cell, by looking at every vertex in it. */
+static rqt_interval interval_of(const model *m, int k, int level, int i, int j, bool exact) {
+    unsigned em[2] = {0, ORACLE_INFINITY};
+    for (int up = 0; up < 2 && level - up >= 0; up++) {
+        int side = 1 << (m->o.K - level + up), stride = side >> k;
+        em[up] = 0;
+        for (int y = (j >> up) * side; y <= (j >> up) * side + side; y++) {
+            for (int x = (i >> up) * side; x <= (i >> up) * side + side; x++) {
+                const oracle_node *n = oracle_at(&m->o, x, y);
+                if (x % stride == 0 && y % stride == 0) continue;
+                if (exact && n->outline) em[up] = ORACLE_INFINITY;
+                if (n->code > em[up]) em[up] = n->code;
+            }
+        }
+    }
+    return (rqt_interval){(rqt_code)em[0], (rqt_code)em[1]};
+}
+
+static void check_summary(const model *m, int k, const rqt_block_place *p, const rqt_summary *s) {
+    const rqt_interval tol = interval_of(m, k, p->level, p->i, p->j, false);
+    const rqt_interval exact = interval_of(m, k, p->level, p->i, p->j, true);
+    CHECK(s->tol.em == tol.em && s->tol.em_parent == tol.em_parent, "k=%d level %d cell (%d,%d): tol [%u,%u)", k,
+          p->level, p->i, p->j, s->tol.em, s->tol.em_parent);
+    CHECK(s->exact.em == exact.em && s->exact.em_parent == exact.em_parent,
+          "k=%d level %d cell (%d,%d): exact [%u,%u), should be [%u,%u)", k, p->level, p->i, p->j, s->exact.em,
+          s->exact.em_parent, exact.em, exact.em_parent);
+    for (int n = 0; n < 4; n++)
+        check_vertex(m, p->x + (n & 1) * p->side, p->y + (n >> 1) * p->side, s->corner[n].q, s->corner[n].error,
+                     s->corner[n].flags, "corner");
+    if (k > 0) {
+        const oracle_node *c = oracle_at(&m->o, p->x + p->side / 2, p->y + p->side / 2);
+        const oracle_point at = {p->x + p->side / 2, p->y + p->side / 2};
+        CHECK(s->center_error == c->code, "centre error");
+        CHECK(s->center_flags == ((oracle_is_valid(&m->o, at) ? RQT_VALID : 0) | (c->outline ? RQT_OUTLINE : 0)),
+              "centre flags");
+    } else {
+        assert_int_equal(s->center_error, 0);
+    }
+    if (p->level == 0) {
+        const rqt_summary_vertex none = {0, 0, 0};
+        for (int n = 0; n < 2; n++)
+            assert_true(s->far[n].q == none.q && s->far[n].error == none.error && s->far[n].flags == none.flags);
+        return;
+    }
+    /* the parent's own corner in this cell, and the parent's corners beside it */
+    int x = p->x + (p->i & 1) * p->side, y = p->y + (p->j & 1) * p->side;
+    check_vertex(m, p->i & 1 ? x - 2 * p->side : x + 2 * p->side, y, s->far[0].q, s->far[0].error, s->far[0].flags,
+                 "far 0");
+    check_vertex(m, x, p->j & 1 ? y - 2 * p->side : y + 2 * p->side, s->far[1].q, s->far[1].error, s->far[1].flags,
+                 "far 1");
+}
+
+static void check_block(const model *m, int k, const rqt_block_place *p, const rqt_block *b, const char *what) {
+    int n = (1 << k) + 1;
+    assert_int_equal(b->k, k);
+    assert_int_equal(b->width, p->width);
+    assert_int_equal(b->height, p->height);
+    for (int v = 0; v < n; v++)
+        for (int u = 0; u < n; u++)
+            check_vertex(m, p->x + u * p->stride, p->y + v * p->stride, b->q[v * n + u], b->error[v * n + u],
+                         b->flags[v * n + u], what);
+}
+
+/* The blocks of the pyramid, in order and complete; each as it comes and after a round trip through its bytes. */
+static void check_pyramid(const model *m, int k) {
+    rqt_pyramid *pyramid;
+    rqt_block block;
+    database d;
+    const rqt_lattice *l = &m->grid.lattice;
+    assert_int_equal(rqt_pyramid_create(&m->grid, &m->saturated, k, &test_allocator, &pyramid), RQT_OK);
+    assert_int_equal(rqt_block_create(k, &test_allocator, &block), RQT_OK);
+    assert_int_equal(database_create(&d, m, k, &test_allocator), RQT_OK);
+    size_t at = 0;
+    assert_int_equal(rqt_block_levels(l, k), l->K - k + 1);
+    for (int level = 0; level <= l->K - k; level++) {
+        int side = 1 << (l->K - level);
+        for (int code = 0; code < 1 << 2 * level; code++) {
+            int i = 0, j = 0;
+            for (int bit = 0; bit < level; bit++) i |= (code >> 2 * bit & 1) << bit, j |= (code >> (2 * bit + 1) & 1) << bit;
+            const rqt_block_number number = ((rqt_block_number)1 << 2 * level) + (rqt_block_number)code;
+            rqt_block_place place;
+            assert_true(rqt_block_number_of(level, i, j) == number);
+            bool exists = (i == 0 || i * side < m->r.width - 1) && (j == 0 || j * side < m->r.height - 1);
+            CHECK((rqt_block_locate(l, k, number, &place) == RQT_OK) == exists, "k=%d, %dx%d: block %llu", k,
+                  m->r.width, m->r.height, (unsigned long long)number);
+            if (!exists) continue;
+            int stride = side >> k;
+            int right = (m->r.width - 1 - i * side) / stride + 1, bottom = (m->r.height - 1 - j * side) / stride + 1;
+            assert_true(place.level == level && place.i == i && place.j == j && place.x == i * side &&
+                        place.y == j * side && place.side == side && place.stride == stride);
+            assert_int_equal(place.width, right < (1 << k) + 1 ? right : (1 << k) + 1);
+            assert_int_equal(place.height, bottom < (1 << k) + 1 ? bottom : (1 << k) + 1);
+            assert_true(at < rqt_pyramid_count(pyramid) && at < d.count);
+            rqt_block_number told;
+            rqt_summary summary, alone;
+            rqt_pyramid_block(pyramid, at, &told, &summary, &block);
+            CHECK(told == number, "block %zu is %llu, not %llu", at, (unsigned long long)told,
+                  (unsigned long long)number);
+            rqt_pyramid_block(pyramid, at, &told, &alone, NULL);
+            check_summary(m, k, &place, &summary);
+            check_summary(m, k, &place, &alone);
+            check_summary(m, k, &place, &d.block[at].summary);
+            check_block(m, k, &place, &block, "block");
+            assert_int_equal(rqt_block_decode(d.codec, d.block[at].bytes, d.block[at].size, &d.scratch), RQT_OK);
+            check_block(m, k, &place, &d.scratch, "decoded block");
+            at++;
+        }
+    }
+    assert_int_equal(at, rqt_pyramid_count(pyramid));
+    rqt_block_place place;
+    assert_int_equal(rqt_block_locate(l, k, 0, &place), RQT_INVALID);
+    assert_int_equal(rqt_block_locate(l, k, (rqt_block_number)1 << 2 * (l->K - k + 1), &place), RQT_INVALID);
+    database_free(&d, &test_allocator);
+    rqt_block_free(&block, &test_allocator);
+    rqt_pyramid_free(pyramid);
+}
+
+static void blocks_and_summaries_hold_what_the_oracle_says(void **state) {
+    (void)state;
+    random_begin("blocks");
+    for (int n = 0; n < 60; n++) {
+        model m;
+        int most = n % 12 == 0 ? 40 : 20;
+        raster r = raster_make((surface)random_between(0, SURFACE_COUNT - 1), random_between(1, most),
+                               random_between(1, most), random_between(-1, 3));
+        if (n % 3 == 0) raster_add_lake(&r);
+        model_create(&m, r);
+        for (int k = smallest_k(&m.grid.lattice); k <= largest_k(&m.grid.lattice); k++) check_pyramid(&m, k);
+        model_free(&m);
+    }
+}
+
+static int random_eps(const model *m) {
+    switch (random_between(0, 5)) {
+    case 0: return 0;
+    case 1: return RQT_CODE_LARGEST;
+    default: {
+        unsigned code = oracle_at(&m->o, random_between(0, m->o.side - 1), random_between(0, m->o.side - 1))->code;
+        int eps = (int)code + random_between(-1, 1);
+        return eps < 0 ? 0 : eps > RQT_CODE_LARGEST ? RQT_CODE_LARGEST : eps;
+    }
+    }
+}
+
+static void every_place_has_exactly_one_answering_block(void **state) {
+    (void)state;
+    random_begin("partition");
+    for (int n = 0; n < 40; n++) {
+        model m;
+        raster r = raster_make(n % 2 ? SURFACE_HILLS : SURFACE_NOISE, random_between(2, 36), random_between(2, 36), -1);
+        if (n % 3) raster_add_lake(&r);
+        model_create(&m, r);
+        int width = m.r.width - 1, height = m.r.height - 1;
+        int *seen = calloc((size_t)(width * height), sizeof *seen);
+        for (int k = smallest_k(&m.grid.lattice); k <= largest_k(&m.grid.lattice); k++) {
+            database d;
+            assert_int_equal(database_create(&d, &m, k, &test_allocator), RQT_OK);
+            for (int e = 0; e < 8; e++) {
+                rqt_code eps = (rqt_code)random_eps(&m);
+                rqt_outline outline = e % 2 ? RQT_OUTLINE_EXACT : RQT_OUTLINE_TOL;
+                memset(seen, 0, (size_t)(width * height) * sizeof *seen);
+                for (size_t b = 0; b < d.count; b++) {
+                    const stored *s = &d.block[b];
+                    const rqt_interval *i = outline == RQT_OUTLINE_EXACT ? &s->summary.exact : &s->summary.tol;
+                    bool answers = rqt_summary_answers(&s->summary, outline, eps);
+                    assert_true(answers == (i->em <= eps && eps < i->em_parent));
+                    for (int y = s->place.y; answers && y < s->place.y + s->place.side && y < height; y++)
+                        for (int x = s->place.x; x < s->place.x + s->place.side && x < width; x++)
+                            seen[y * width + x]++;
+                }
+                for (int c = 0; c < width * height; c++)
+                    CHECK(seen[c] == 1, "k=%d, eps code %d: cell (%d,%d) has %d answers", k, (int)eps, c % width,
+                          c / width, seen[c]);
+            }
+            database_free(&d, &test_allocator);
+        }
+        free(seen);
+        model_free(&m);
+    }
+}
+
+/* ----------------------------------------------------------------------------------------- queries -- */
+
+/* What the oracle wants: the triangles, and of each of their samples the largest error and the smallest level. */
+typedef struct wanted {
+    key *keys;
+    size_t count;
+    int64_t *code;
+    int *level;
+} wanted;
+
+static void wanted_free(wanted *w) {
+    free(w->keys);
+    free(w->code);
+    free(w->level);
+}
+
+static wanted wanted_of(const model *m, const oracle_list *leaves, const window *in) {
+    size_t samples = (size_t)(m->r.width * m->r.height);
+    wanted w = {calloc(leaves->count + 1, sizeof *w.keys), 0, calloc(samples, sizeof *w.code),
+                calloc(samples, sizeof *w.level)};
+    if (!w.keys || !w.code || !w.level) abort();
+    for (size_t n = 0; n < samples; n++) w.code[n] = -1;
+    for (size_t n = 0; n < leaves->count; n++) {
+        const oracle_triangle *t = &leaves->triangle[n];
+        int64_t sample[3];
+        if (!window_meets(in, &m->o, t)) continue;
+        for (int c = 0; c < 3; c++) {
+            const oracle_point at = oracle_clamp(&m->o, t->corner[c]);
+            const oracle_node *node = oracle_at(&m->o, t->corner[c].x, t->corner[c].y);
+            sample[c] = (int64_t)at.y * m->r.width + at.x;
+            int seen = w.code[sample[c]] >= 0;
+            if (!seen || node->level < w.level[sample[c]]) w.level[sample[c]] = node->level;
+            if (node->code > w.code[sample[c]]) w.code[sample[c]] = node->code;
+        }
+        w.keys[w.count++] = key_unwound(sample[0], sample[1], sample[2]);
+    }
+    if (w.count) qsort(w.keys, w.count, sizeof *w.keys, ordered_keys);
+    return w;
+}
+
+static void check_patch(const model *m, const rqt_patch *p, const wanted *w, const char *what) {
+    int width = m->r.width;
+    key *keys = keys_of_patch(p, width);
+    size_t n = 0;
+    while (n < p->triangle_count && n < w->count && ordered_keys(&keys[n], &w->keys[n]) == 0) n++;
+    if (n < p->triangle_count || n < w->count) {
+        raster_print(&m->r);
+        print_error("%zu triangles, should be %zu\n", p->triangle_count, w->count);
+        for (int which = 0; which < 2; which++) {
+            const key *k = which ? w->keys : keys;
+            size_t count = which ? w->count : p->triangle_count;
+            if (n < count)
+                print_error("first difference: %s (%d,%d) (%d,%d) (%d,%d)\n", which ? "wanted" : "got",
+                            (int)(k[n].v[0] % width), (int)(k[n].v[0] / width), (int)(k[n].v[1] % width),
+                            (int)(k[n].v[1] / width), (int)(k[n].v[2] % width), (int)(k[n].v[2] / width));
+        }
+        fail_msg("%s", what);
+    }
+    free(keys);
+    unsigned char *seen = calloc((size_t)(width * m->r.height), 1), *used = calloc(p->vertex_count + 1, 1);
+    if (!seen || !used) abort();
+    for (size_t t = 0; t < p->triangle_count; t++) {
+        const rqt_patch_vertex *v[3];
+        for (size_t c = 0; c < 3; c++) {
+            v[c] = &p->vertices[p->triangles[3 * t + c]];
+            used[p->triangles[3 * t + c]] = 1;
+        }
+        int64_t area = (int64_t)(v[1]->col - v[0]->col) * (v[2]->row - v[0]->row) -
+                       (int64_t)(v[2]->col - v[0]->col) * (v[1]->row - v[0]->row);
+        CHECK(area < 0, "%s: triangle %zu is not counter-clockwise", what, t);
+    }
+    for (size_t v = 0; v < p->vertex_count; v++) {
+        const rqt_patch_vertex *at = &p->vertices[v];
+        CHECK(at->col >= 0 && at->row >= 0 && at->col < width && at->row < m->r.height, "%s: no such sample", what);
+        int sample = at->row * width + at->col;
+        CHECK(!seen[sample], "%s: sample (%d,%d) is a vertex twice", what, at->col, at->row);
+        seen[sample] = 1;
+        CHECK(used[v], "%s: vertex %zu is in no triangle", what, v);
+        CHECK(at->q == m->r.q[sample], "%s: height of (%d,%d)", what, at->col, at->row);
+        CHECK(at->error == w->code[sample] && at->level == w->level[sample],
+              "%s: (%d,%d) has error %u level %u, should be %d %d", what, at->col, at->row, at->error, at->level,
+              (int)w->code[sample], w->level[sample]);
+    }
+    free(seen);
+    free(used);
+}
+
+/* Every block size and every way of selecting, at one eps, in one window. */
+static void check_window(const model *m, database *d, int sizes, const window *w, const oracle_list *leaves,
+                         rqt_code eps, rqt_outline outline) {
+    wanted want = wanted_of(m, leaves, w);
+    rqt_region *region = region_of(w, &m->grid.lattice);
+    for (int n = 0; n < sizes; n++) {
+        for (int select = 0; select < 3; select++) {
+            rqt_patch patch;
+            char what[1200];
+            (void)snprintf(what, sizeof what, "k=%d eps code %u %s select %d, window %s: %s", d[n].k, eps,
+                           outline == RQT_OUTLINE_EXACT ? "exact" : "tol", select, w->kind, w->text);
+            rqt_status status = database_query(&d[n], region, eps, (rqt_select)select, outline, &test_allocator,
+                                               &patch);
+            CHECK(status == RQT_OK, "%s: status %d", what, (int)status);
+            check_patch(m, &patch, &want, what);
+            rqt_patch_free(&patch);
+        }
+    }
+    rqt_region_free(region);
+    wanted_free(&want);
+}
+
+static void check_queries(raster r, int eps_count, int window_count) {
+    model m;
+    database d[MOST_SIZES];
+    int sizes = 0;
+    model_create(&m, r);
+    for (int k = smallest_k(&m.grid.lattice); k <= largest_k(&m.grid.lattice); k++, sizes++)
+        assert_int_equal(database_create(&d[sizes], &m, k, &test_allocator), RQT_OK);
+    unsigned char *set = oracle_set_create(&m.o);
+    for (int e = 0; e < eps_count; e++) {
+        rqt_code eps = e == 0 ? 0 : e == 1 ? RQT_CODE_LARGEST : (rqt_code)random_eps(&m);
+        for (int exact = 0; exact < 2; exact++) {
+            oracle_list leaves = {0};
+            oracle_select(&m.o, eps, exact, set);
+            oracle_leaves(&m.o, set, &leaves);
+            for (int n = 0; n <= window_count; n++) {
+                window w = n == 0 ? window_all()
+                                  : random_window(m.r.width, m.r.height, random_between(0, WINDOW_KINDS - 1));
+                check_window(&m, d, sizes, &w, &leaves, eps, exact ? RQT_OUTLINE_EXACT : RQT_OUTLINE_TOL);
+            }
+            oracle_list_free(&leaves);
+        }
+    }
+    free(set);
+    for (int n = 0; n < sizes; n++) database_free(&d[n], &test_allocator);
+    model_free(&m);
+}
+
+static void queries_equal_the_global_walk_on_small_rasters(void **state) {
+    (void)state;
+    random_begin("small queries");
+    for (int n = 0; n < 120; n++) {
+        raster r = raster_make((surface)random_between(0, SURFACE_COUNT - 1), random_between(1, 12),
+                               random_between(1, 12), random_between(-1, 6));
+        if (n % 4 == 0) raster_add_lake(&r);
+        check_queries(r, 5, 5);
+    }
+}
+
+static void queries_equal_the_global_walk_on_larger_rasters(void **state) {
+    (void)state;
+    random_begin("larger queries");
+    const int sides[][2] = {{33, 33}, {34, 20}, {17, 36}, {24, 30}, {33, 18}, {19, 19}};
+    for (size_t n = 0; n < sizeof sides / sizeof *sides; n++) {
+        raster r = raster_make(n % 2 ? SURFACE_HILLS : SURFACE_TAKAGI, sides[n][0], sides[n][1], -1);
+        if (n % 3 != 1) raster_add_lake(&r);
+        check_queries(r, 5, 4);
+    }
+    check_queries(raster_make(SURFACE_HILLS, 65, 65, -1), 4, 1);
+    check_queries(raster_make(SURFACE_HILLS, 70, 61, 1), 4, 1);
+}
+
+static void a_plane_at_eps_0_is_two_triangles(void **state) {
+    (void)state;
+    random_begin("two triangles");
+    for (int n = 0; n < 40; n++) {
+        model m;
+        database d;
+        rqt_patch patch;
+        model_create(&m, raster_make(SURFACE_PLANE, random_between(2, 40), random_between(2, 40), -1));
+        assert_int_equal(database_create(&d, &m, random_between(smallest_k(&m.grid.lattice), m.grid.lattice.K),
+                                         &test_allocator), RQT_OK);
+        window all = window_all();
+        rqt_region *region = region_of(&all, &m.grid.lattice);
+        assert_int_equal(database_query(&d, region, 0, RQT_SELECT_THRESHOLD, RQT_OUTLINE_EXACT, &test_allocator,
+                                        &patch), RQT_OK);
+        CHECK(patch.triangle_count == 2 && patch.vertex_count == 4, "%dx%d: %zu triangles", m.r.width, m.r.height,
+              patch.triangle_count);
+        assert_int_equal(d.reads, 0);
+        rqt_patch_free(&patch);
+        rqt_region_free(region);
+        database_free(&d, &test_allocator);
+        model_free(&m);
+    }
+}
+
+/* Samples in each triangle of the patch against its plane; unit half-cells against the mask. The patch alone is
+ * looked at: neither leaves nor errors of the oracle. */
+static void check_bound_and_cover(const model *m, const rqt_patch *p, rqt_code eps, bool exact) {
+    mpq_t off, most;
+    mpq_inits(off, most, NULL);
+    oracle_code_value(most, eps);
+    int width = m->r.width, height = m->r.height;
+    long area = 0;
+    for (size_t t = 0; t < p->triangle_count; t++) {
+        long x[3], y[3], z[3], worst = 0;
+        for (size_t c = 0; c < 3; c++) {
+            const rqt_patch_vertex *v = &p->vertices[p->triangles[3 * t + c]];
+            x[c] = v->col, y[c] = v->row, z[c] = v->q;
+        }
+        long D = labs((x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0]));
+        area += D;
+        for (int n = 0; n < width * height; n++) {
+            long w[3], sum = 0;
+            for (int c = 0; c < 3; c++) { /* counter-clockwise: inside is <= 0 */
+                int a = (c + 1) % 3, b = (c + 2) % 3;
+                w[c] = -((x[b] - x[a]) * (n / width - y[a]) - (n % width - x[a]) * (y[b] - y[a]));
+                sum += w[c] * z[c];
+            }
+            if (w[0] < 0 || w[1] < 0 || w[2] < 0) continue;
+            if (m->r.valid && !m->r.valid[n]) {
+                CHECK(!exact, "void sample (%d,%d) is covered", n % width, n / width);
+                continue;
+            }
+            long deviation = labs(sum - D * m->r.q[n]);
+            worst = deviation > worst ? deviation : worst;
+        }
+        CHECK(eps > 0 || worst == 0, "eps 0 is not lossless in triangle %zu", t);
+        mpq_set_si(off, worst, (unsigned long)D);
+        mpq_canonicalize(off);
+        mpq_mul(off, off, m->o.quantum);
+        CHECK(mpq_cmp(off, most) <= 0, "triangle %zu is further off than eps code %u", t, eps);
+    }
+    oracle_list units = {0};
+    oracle_unit_triangles(&m->o, &units);
+    assert_int_equal(units.count, 2 * (width - 1) * (height - 1));
+    long right = 0;
+    for (size_t u = 0; u < units.count; u++) {
+        const oracle_triangle *unit = &units.triangle[u];
+        long cx = 0, cy = 0; /* three times the centroid, in no triangle's border */
+        int valid = 1, covered = 0;
+        for (int c = 0; c < 3; c++) {
+            cx += unit->corner[c].x, cy += unit->corner[c].y;
+            valid = valid && oracle_is_valid(&m->o, unit->corner[c]);
+        }
+        for (size_t t = 0; t < p->triangle_count; t++) {
+            int inside = 1;
+            for (size_t c = 0; c < 3 && inside; c++) {
+                const rqt_patch_vertex *a = &p->vertices[p->triangles[3 * t + c]];
+                const rqt_patch_vertex *b = &p->vertices[p->triangles[3 * t + (c + 1) % 3]];
+                inside = (b->col - a->col) * (cy - 3 * a->row) - (cx - 3 * a->col) * (b->row - a->row) < 0;
+            }
+            covered += inside;
+        }
+        right += valid;
+        CHECK(covered <= 1, "a half-cell at (%d,%d) is covered twice", unit->corner[0].x, unit->corner[0].y);
+        if (exact)
+            CHECK(covered == valid, "eps code %u: half-cell at (%d,%d) with %s corners is covered %d times", eps,
+                  unit->corner[0].x, unit->corner[0].y, valid ? "three valid" : "void", covered);
+    }
+    if (exact) assert_int_equal(area, right);
+    oracle_list_free(&units);
+    mpq_clears(off, most, NULL);
+}
+
+static void no_valid_sample_is_further_than_eps_and_exact_outlines_are_exact(void **state) {
+    (void)state;
+    random_begin("bound");
+    for (int n = 0; n < 60; n++) {
+        model m;
+        database d;
+        raster r = raster_make((surface)random_between(0, SURFACE_COUNT - 1), random_between(2, 22),
+                               random_between(2, 22), random_between(-1, 8));
+        if (n % 2) raster_add_lake(&r);
+        model_create(&m, r);
+        int k = random_between(smallest_k(&m.grid.lattice), largest_k(&m.grid.lattice));
+        assert_int_equal(database_create(&d, &m, k, &test_allocator), RQT_OK);
+        window all = window_all();
+        rqt_region *region = region_of(&all, &m.grid.lattice);
+        for (int e = 0; e < 12; e++) {
+            rqt_code eps = e < 2 ? 0 : e < 4 ? RQT_CODE_LARGEST : (rqt_code)random_eps(&m);
+            rqt_patch patch;
+            assert_int_equal(database_query(&d, region, eps, RQT_SELECT_THRESHOLD,
+                                            e % 2 ? RQT_OUTLINE_EXACT : RQT_OUTLINE_TOL, &test_allocator, &patch),
+                             RQT_OK);
+            check_bound_and_cover(&m, &patch, eps, e % 2);
+            rqt_patch_free(&patch);
+        }
+        rqt_region_free(region);
+        database_free(&d, &test_allocator);
+        model_free(&m);
+    }
+}
+
+static size_t unite(key *keys, size_t count, const rqt_patch *p, int width) {
+    key *more = keys_of_patch(p, width);
+    memcpy(keys + count, more, p->triangle_count * sizeof *keys);
+    free(more);
+    count += p->triangle_count;
+    if (count) qsort(keys, count, sizeof *keys, ordered_keys);
+    size_t kept = 0;
+    for (size_t n = 0; n < count; n++)
+        if (n == 0 || ordered_keys(&keys[n], &keys[kept - 1]) != 0) keys[kept++] = keys[n];
+    return kept;
+}
+
+static void parts_of_a_split_window_make_exactly_the_whole(void **state) {
+    (void)state;
+    random_begin("split");
+    for (int n = 0; n < 40; n++) {
+        model m;
+        database d;
+        raster r = raster_make(SURFACE_HILLS, random_between(10, 66), random_between(10, 66), -1);
+        if (n % 2) raster_add_lake(&r);
+        model_create(&m, r);
+        int k = random_between(1, m.grid.lattice.K);
+        assert_int_equal(database_create(&d, &m, k, &test_allocator), RQT_OK);
+        for (int w = 0; w < 6; w++) {
+            const long grain = w % 3 == 0 ? ORACLE_UNITS : w % 3 == 1 ? ORACLE_UNITS / 2 : 1;
+            rqt_code eps = (rqt_code)random_eps(&m);
+            rqt_outline outline = w % 2 ? RQT_OUTLINE_EXACT : RQT_OUTLINE_TOL;
+            long whole[4];
+            random_rectangle(m.r.width, m.r.height, grain, whole);
+            long across[3] = {whole[0], (whole[0] + whole[2]) / 2 / grain * grain, whole[2]};
+            long down[3] = {whole[1], (whole[1] + whole[3]) / 2 / grain * grain, whole[3]};
+            size_t room = (size_t)(8 * m.r.width * m.r.height), parts = 0;
+            key *keys = calloc(2 * room, sizeof *keys);
+            if (!keys) abort();
+            for (int part = 0; part < 5; part++) { /* four quarters, then the whole */
+                int i = part & 1, j = part >> 1;
+                const long rectangle[4] = {across[i], down[j], across[i + 1], down[j + 1]};
+                if (part < 4 && (rectangle[0] >= rectangle[2] || rectangle[1] >= rectangle[3])) continue;
+                window one = window_of(part < 4 ? rectangle : whole);
+                rqt_region *region = region_of(&one, &m.grid.lattice);
+                rqt_patch patch;
+                assert_int_equal(database_query(&d, region, eps, RQT_SELECT_THRESHOLD, outline, &test_allocator,
+                                                &patch), RQT_OK);
+                assert_true(parts + patch.triangle_count <= room);
+                if (part < 4) {
+                    parts = unite(keys, parts, &patch, m.r.width);
+                } else {
+                    key *all = keys_of_patch(&patch, m.r.width);
+                    CHECK(patch.triangle_count == parts, "%s: the parts have %zu triangles, the whole has %zu",
+                          one.text, parts, patch.triangle_count);
+                    if (parts) assert_memory_equal(all, keys, parts * sizeof *keys);
+                    free(all);
+                }
+                rqt_patch_free(&patch);
+                rqt_region_free(region);
+            }
+            free(keys);
+        }
+        database_free(&d, &test_allocator);
+        model_free(&m);
+    }
+}
+
+static void a_placement_moves_the_window_and_changes_nothing_else(void **state) {
+    (void)state;
+    random_begin("placement");
+    const rqt_placement placement = {4096, 1024, 0.5, -2};
+    for (int n = 0; n < 40; n++) {
+        rqt_lattice l;
+        int32_t at[4], moved_at[4];
+        long r[4];
+        assert_int_equal(rqt_lattice_init(&l, 30, 20), RQT_OK);
+        random_rectangle(30, 20, n % 2 ? 1 : ORACLE_UNITS, r);
+        window w = window_of(r), moved = {.kind = "moved"};
+        window_append(&moved, "POLYGON");
+        window_append_ring(&moved, 4096 + samples_of(r[0]) / 2, 1024 - 2 * samples_of(r[1]),
+                           4096 + samples_of(r[2]) / 2, 1024 - 2 * samples_of(r[3]));
+        rqt_region *region = region_of(&w, &l), *other;
+        rqt_geometry *geometry;
+        rqt_message message;
+        assert_int_equal(
+            rqt_geometry_parse(moved.text, strlen(moved.text), true, &test_allocator, &geometry, &message), RQT_OK);
+        assert_int_equal(rqt_region_create(geometry, &placement, &l, &test_allocator, &other), RQT_OK);
+        rqt_geometry_free(geometry);
+        bool meets = rqt_region_box(region, at, at + 1, at + 2, at + 3);
+        assert_true(meets == rqt_region_box(other, moved_at, moved_at + 1, moved_at + 2, moved_at + 3));
+        if (meets) assert_memory_equal(at, moved_at, sizeof at);
+        for (int t = 0; t < 200; t++) {
+            rqt_vertex v[3];
+            for (int c = 0; c < 3; c++) v[c] = (rqt_vertex){random_between(0, 29), random_between(0, 19)};
+            oracle o = {.terrain = {.width = 30, .height = 20}};
+            const oracle_triangle triangle = {{{v[0].x, v[0].y}, {v[1].x, v[1].y}, {v[2].x, v[2].y}}, 0};
+            if (oracle_area(&o, &triangle) == 0) continue;
+            bool right = oracle_meets_rectangle(&o, &triangle, r);
+            assert_true(rqt_region_meets(region, v[0], v[1], v[2]) == right);
+            assert_true(rqt_region_meets(other, v[0], v[1], v[2]) == right);
+        }
+        rqt_region_free(region);
+        rqt_region_free(other);
+    }
+}
+
+static bool interrupt(void *context) {
+    (void)context;
+    return true;
+}
+
+static void unreadable_blocks_and_interrupts_stop_a_query(void **state) {
+    (void)state;
+    random_begin("stopped queries");
+    model m;
+    database d;
+    rqt_patch patch;
+    model_create(&m, raster_make(SURFACE_NOISE, 30, 30, -1));
+    assert_int_equal(database_create(&d, &m, 2, &test_allocator), RQT_OK);
+    window all = window_all();
+    rqt_region *region = region_of(&all, &m.grid.lattice);
+    size_t before = test_heap.live;
+    d.corrupt = 1;
+    assert_int_equal(database_query(&d, region, 0, RQT_SELECT_THRESHOLD, RQT_OUTLINE_EXACT, &test_allocator, &patch),
+                     RQT_READ_FAILED);
+    rqt_patch_free(&patch);
+    assert_int_equal(test_heap.live, before);
+    d.corrupt = 0;
+    rqt_answer *answers = calloc(d.count, sizeof *answers);
+    rqt_query query = {.lattice = d.lattice,
+                       .k = d.k,
+                       .region = region,
+                       .answers = answers,
+                       .answer_count = database_answers(&d, region, 0, RQT_OUTLINE_EXACT, answers),
+                       .read_block = database_read,
+                       .is_interrupted = interrupt,
+                       .context = &d};
+    assert_true(query.answer_count > 0);
+    d.asking = &query;
+    assert_int_equal(rqt_query_run(&query, &test_allocator, &patch), RQT_INTERRUPTED);
+    rqt_patch_free(&patch);
+    assert_int_equal(test_heap.live, before);
+    free(answers);
+    rqt_region_free(region);
+    database_free(&d, &test_allocator);
+    model_free(&m);
+}
+
+int main(void) {
+    random_announce();
+    const struct CMUnitTest tests[] = {
+        TEST(blocks_and_summaries_hold_what_the_oracle_says),
+        TEST(every_place_has_exactly_one_answering_block),
+        TEST(queries_equal_the_global_walk_on_small_rasters),
+        TEST(queries_equal_the_global_walk_on_larger_rasters),
+        TEST(a_plane_at_eps_0_is_two_triangles),
+        TEST(no_valid_sample_is_further_than_eps_and_exact_outlines_are_exact),
+        TEST(parts_of_a_split_window_make_exactly_the_whole),
+        TEST(a_placement_moves_the_window_and_changes_nothing_else),
+        TEST(unreadable_blocks_and_interrupts_stop_a_query),
+    };
+    return cmocka_run_group_tests_name("blocks and queries", tests, NULL, NULL);
+}
