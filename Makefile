@@ -4,8 +4,8 @@
 # part of our own command (linked to SQLite). Everything else once, position-independent.
 
 BUILD ?= build
-CC ?= gcc
-CXX ?= g++
+CC = gcc
+CXX = g++
 OPTIMIZE ?= -O3
 WARNINGS = -Wall -Wextra -Wconversion -Wshadow -Werror
 SANITIZE ?=
@@ -40,32 +40,32 @@ products: $(BUILD)/rqt $(BUILD)/rqt.so
 
 $(BUILD)/librqt.a: $(CORE)
 	@rm -f $@
-	ar rcs $@ $^
+	@echo "  archive $@"; ar rcs $@ $^
 
 $(BUILD)/rqt.so: $(SQL_HOSTED) $(PLAIN) $(GEO) $(BUILD)/librqt.a ext/exports.map
-	$(CXX) $(SANITIZE) -shared -Wl,--version-script=ext/exports.map -Wl,-z,defs -o $@ $(SQL_HOSTED) $(PLAIN) $(GEO) $(BUILD)/librqt.a $(LIBS_EXT)
+	@echo "  link $@"; $(CXX) $(SANITIZE) -shared -Wl,--version-script=ext/exports.map -Wl,-z,defs -o $@ $(SQL_HOSTED) $(PLAIN) $(GEO) $(BUILD)/librqt.a $(LIBS_EXT)
 
 $(BUILD)/rqt: $(CLI) $(SQL_LINKED) $(IMPORT) $(PLAIN) $(GEO) $(BUILD)/librqt.a
-	$(CXX) $(SANITIZE) -o $@ $^ $(LIBS_CLI)
+	@echo "  link $@"; $(CXX) $(SANITIZE) -o $@ $^ $(LIBS_CLI)
 
 $(BUILD)/hosted/%.o: %.c $(GENERATED)
 	@mkdir -p $(@D)
-	$(CC) $(CFLAGS) $(INCLUDES) -c $< -o $@
+	@echo "  compile $<"; $(CC) $(CFLAGS) $(INCLUDES) -c $< -o $@
 $(BUILD)/linked/%.o: %.c $(GENERATED)
 	@mkdir -p $(@D)
-	$(CC) $(CFLAGS) $(INCLUDES) -DSQLITE_CORE -c $< -o $@
+	@echo "  compile $<"; $(CC) $(CFLAGS) $(INCLUDES) -DSQLITE_CORE -c $< -o $@
 $(BUILD)/import/%.o: src/import/%.c
 	@mkdir -p $(@D)
-	$(CC) $(CFLAGS) $(INCLUDES) -DSQLITE_CORE $(GDAL_CFLAGS) -c $< -o $@
+	@echo "  compile $<"; $(CC) $(CFLAGS) $(INCLUDES) -DSQLITE_CORE $(GDAL_CFLAGS) -c $< -o $@
 $(BUILD)/cli/%.o: src/cli/%.c $(GENERATED)
 	@mkdir -p $(@D)
-	$(CC) $(CFLAGS) $(INCLUDES) -DSQLITE_CORE $(CAIRO_CFLAGS) -c $< -o $@
+	@echo "  compile $<"; $(CC) $(CFLAGS) $(INCLUDES) -DSQLITE_CORE $(CAIRO_CFLAGS) -c $< -o $@
 $(BUILD)/geo/%.o: src/geo/%.cpp
 	@mkdir -p $(@D)
-	$(CXX) $(CXXFLAGS) $(INCLUDES) -c $< -o $@
+	@echo "  compile $<"; $(CXX) $(CXXFLAGS) $(INCLUDES) -c $< -o $@
 $(BUILD)/%.o: src/%.c
 	@mkdir -p $(@D)
-	$(CC) $(CFLAGS) $(INCLUDES) -c $< -o $@
+	@echo "  compile $<"; $(CC) $(CFLAGS) $(INCLUDES) -c $< -o $@
 
 # The SQL that a person can read is the SQL that the program runs.
 $(BUILD)/generated/schema_sql.h: sql/schema.sql sql/terrain.sql sql/geopackage.sql

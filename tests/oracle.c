@@ -16,7 +16,9 @@ static void *take(size_t count, size_t size) {
     return p;
 }
 
-static oracle_node *node_at(const oracle *o, oracle_point p) { return &o->node[p.y * o->side + p.x]; }
+static oracle_node *node_at(const oracle *o, oracle_point p) {
+    return &o->node[p.y * o->side + p.x];
+}
 
 const oracle_node *oracle_at(const oracle *o, int x, int y) {
     oracle_point p = {x, y};
@@ -33,7 +35,9 @@ static int sample_is_valid(const oracle *o, int x, int y) {
     return !o->terrain.valid || o->terrain.valid[y * o->terrain.width + x] != 0;
 }
 
-static int sample_height(const oracle *o, int x, int y) { return o->terrain.q[y * o->terrain.width + x]; }
+static int sample_height(const oracle *o, int x, int y) {
+    return o->terrain.q[y * o->terrain.width + x];
+}
 
 int oracle_is_valid(const oracle *o, oracle_point lattice) {
     oracle_point p = oracle_clamp(o, lattice);
@@ -291,8 +295,10 @@ void oracle_free(oracle *o) {
  * 0 is 0; c > 0 is (128 + (c & 127)) * 2^((c >> 7) - 263). */
 void oracle_code_value(mpq_t value, unsigned code) {
     mpq_set_ui(value, code == 0 ? 0 : 128 + (code & 127), 1);
-    if ((code >> 7) >= 263) mpq_mul_2exp(value, value, (code >> 7) - 263);
-    else mpq_div_2exp(value, value, 263 - (code >> 7));
+    if ((code >> 7) >= 263)
+        mpq_mul_2exp(value, value, (code >> 7) - 263);
+    else
+        mpq_div_2exp(value, value, 263 - (code >> 7));
 }
 
 static int compare_code(unsigned code, const mpq_t m) {
@@ -331,7 +337,9 @@ unsigned oracle_code_down(const mpq_t m) {
 
 /* ---------------------------------------------------------------------------------------------- sets -- */
 
-unsigned char *oracle_set_create(const oracle *o) { return take((size_t)(o->side * o->side), 1); }
+unsigned char *oracle_set_create(const oracle *o) {
+    return take((size_t)(o->side * o->side), 1);
+}
 
 static void add_corners(const oracle *o, unsigned char *set) {
     int s = o->side - 1;
@@ -491,19 +499,75 @@ static void polygon_clip(const polygon *in, const long plane[3], polygon *out) {
     mpq_clears(here, there, share, at.x, at.y, NULL);
 }
 
-static int polygon_has_area(const polygon *p) {
-    mpq_t sum, part;
-    mpq_inits(sum, part, NULL);
+/* Twice the area, without sign. */
+static void polygon_area(const polygon *p, mpq_t area) {
+    mpq_t part;
+    mpq_init(part);
+    mpq_set_ui(area, 0, 1);
     for (int n = 0; n < p->count; n++) {
         const rational_point *a = &p->point[n], *b = &p->point[(n + 1) % p->count];
         mpq_mul(part, a->x, b->y);
-        mpq_add(sum, sum, part);
+        mpq_add(area, area, part);
         mpq_mul(part, a->y, b->x);
-        mpq_sub(sum, sum, part);
+        mpq_sub(area, area, part);
     }
-    int has = mpq_sgn(sum) != 0;
-    mpq_clears(sum, part, NULL);
+    mpq_abs(area, area);
+    mpq_clear(part);
+}
+
+static int polygon_has_area(const polygon *p) {
+    mpq_t area;
+    mpq_init(area);
+    polygon_area(p, area);
+    int has = mpq_sgn(area) != 0;
+    mpq_clear(area);
     return has;
+}
+
+/* Keeps what lies in the n half-planes. */
+static void polygon_keep(polygon *p, const long plane[][3], int n) {
+    polygon rest;
+    polygon_init(&rest);
+    for (int m = 0; m < n && p->count > 0; m++) {
+        polygon_clip(p, plane[m], &rest);
+        p->count = 0;
+        for (int c = 0; c < rest.count; c++) polygon_push(p, &rest.point[c]);
+    }
+    polygon_clear(&rest);
+}
+
+/* The three half-planes whose intersection is the closed triangle with an area, its coordinates in `units`. */
+static void half_planes(const oracle_point corner[3], long units, long plane[3][3]) {
+    oracle_point p[3] = {corner[0], corner[1], corner[2]};
+    if (cross(p[0], p[1], p[2]) < 0) {
+        p[1] = corner[2];
+        p[2] = corner[1];
+    }
+    for (int n = 0; n < 3; n++) {
+        oracle_point a = p[n], b = p[(n + 1) % 3];
+        plane[n][0] = -(long)(b.y - a.y);
+        plane[n][1] = (long)(b.x - a.x);
+        plane[n][2] = -(plane[n][0] * a.x + plane[n][1] * a.y) * units;
+    }
+}
+
+static void polygon_of(polygon *p, const oracle_point corner[3], long units) {
+    polygon_init(p);
+    for (int n = 0; n < 3; n++) {
+        mpq_set_si(p->point[n].x, corner[n].x * units, 1);
+        mpq_set_si(p->point[n].y, corner[n].y * units, 1);
+    }
+    p->count = 3;
+}
+
+void oracle_common_area(const oracle_point a[3], const oracle_point b[3], mpq_t area) {
+    long plane[3][3];
+    polygon p;
+    polygon_of(&p, a, 1);
+    half_planes(b, 1, plane);
+    polygon_keep(&p, (const long(*)[3])plane, 3);
+    polygon_area(&p, area);
+    polygon_clear(&p);
 }
 
 long oracle_round(double samples) {
@@ -525,54 +589,32 @@ long oracle_round(double samples) {
 int oracle_meets_rectangle(const oracle *o, const oracle_triangle *t, const long rectangle[4]) {
     const long side[4][3] = {
         {1, 0, -rectangle[0]}, {0, 1, -rectangle[1]}, {-1, 0, rectangle[2]}, {0, -1, rectangle[3]}};
-    oracle_point p[3];
-    polygon from, to;
-    clamp_corners(o, t, p);
-    polygon_init(&from);
-    polygon_init(&to);
-    for (int n = 0; n < 3; n++) {
-        mpq_set_si(from.point[n].x, p[n].x * ORACLE_UNITS, 1);
-        mpq_set_si(from.point[n].y, p[n].y * ORACLE_UNITS, 1);
-    }
-    from.count = 3;
-    for (int n = 0; n < 4 && from.count > 0; n++) {
-        polygon_clip(&from, side[n], &to);
-        from.count = 0;
-        for (int m = 0; m < to.count; m++) polygon_push(&from, &to.point[m]);
-    }
-    int meets = from.count > 0 && polygon_has_area(&from);
-    polygon_clear(&from);
-    polygon_clear(&to);
+    oracle_point corner[3];
+    polygon p;
+    clamp_corners(o, t, corner);
+    polygon_of(&p, corner, ORACLE_UNITS);
+    polygon_keep(&p, side, 4);
+    int meets = p.count > 0 && polygon_has_area(&p);
+    polygon_clear(&p);
     return meets;
 }
 
-/* The segment is a two-cornered polygon; what the triangle's three closed half-planes leave of it is not empty. */
+/* The segment is a polygon of two corners; what the triangle's three closed half-planes leave of it is not empty.
+ */
 int oracle_meets_segment(const oracle *o, const oracle_triangle *t, const long segment[4]) {
-    oracle_point p[3];
-    polygon from, to;
-    clamp_corners(o, t, p);
-    if (cross(p[0], p[1], p[2]) < 0) { /* inside is where all three are >= 0 */
-        oracle_point swap = p[1];
-        p[1] = p[2];
-        p[2] = swap;
-    }
-    polygon_init(&from);
-    polygon_init(&to);
+    long plane[3][3];
+    oracle_point corner[3];
+    polygon p;
+    clamp_corners(o, t, corner);
+    half_planes(corner, ORACLE_UNITS, plane);
+    polygon_init(&p);
     for (int n = 0; n < 2; n++) {
-        mpq_set_si(from.point[n].x, segment[2 * n], 1);
-        mpq_set_si(from.point[n].y, segment[2 * n + 1], 1);
+        mpq_set_si(p.point[n].x, segment[2 * n], 1);
+        mpq_set_si(p.point[n].y, segment[2 * n + 1], 1);
     }
-    from.count = 2;
-    for (int n = 0; n < 3 && from.count > 0; n++) {
-        oracle_point a = p[n], b = p[(n + 1) % 3];
-        long plane[3] = {-(long)(b.y - a.y), (long)(b.x - a.x), 0};
-        plane[2] = -(plane[0] * a.x + plane[1] * a.y) * ORACLE_UNITS;
-        polygon_clip(&from, plane, &to);
-        from.count = 0;
-        for (int m = 0; m < to.count; m++) polygon_push(&from, &to.point[m]);
-    }
-    int meets = from.count > 0;
-    polygon_clear(&from);
-    polygon_clear(&to);
+    p.count = 2;
+    polygon_keep(&p, (const long(*)[3])plane, 3);
+    int meets = p.count > 0;
+    polygon_clear(&p);
     return meets;
 }

@@ -50,7 +50,7 @@ typedef struct oracle_node {
 
 typedef struct oracle {
     oracle_terrain terrain;
-    int K, side; /* side = 2^K + 1 vertices */
+    int K, side;       /* side = 2^K + 1 vertices */
     oracle_node *node; /* side * side, row by row */
     mpq_t quantum;
 } oracle;
@@ -101,5 +101,7 @@ long oracle_round(double samples);
 int oracle_meets_rectangle(const oracle *o, const oracle_triangle *t, const long rectangle[4]);
 /* Does the closed clamped triangle (which has an area) meet the closed segment, which may be one point? */
 int oracle_meets_segment(const oracle *o, const oracle_triangle *t, const long segment[4]);
+/* Twice the area that two triangles of samples have in common; b has an area. */
+void oracle_common_area(const oracle_point a[3], const oracle_point b[3], mpq_t area);
 
 #endif

@@ -1,7 +1,8 @@
 /* test_core_codes.c - units and error codes keep their promises: exact, and rounded up only.
  *
  * Each value is compared with GMP rationals. Random values seldom come near a code's boundary, so most cases are
- * made backwards: take a code, find the number of quanta that is just it, and try that number and its neighbours. */
+ * made backwards: take a code, find the number of quanta that is just it, and try that number and its neighbours.
+ */
 #include "test_core_support.h"
 
 #include <float.h>
@@ -79,8 +80,10 @@ static void errors_in_quanta_round_up_only_at_random(void **state) {
         rqt_unit unit = some_unit();
         int bits = random_between(1, 80);
         uint64_t low = random_bits(), high = random_bits() & 0xFFFF;
-        if (bits <= 64) high = 0, low >>= 64 - bits;
-        else high &= (1u << (bits - 64)) - 1;
+        if (bits <= 64)
+            high = 0, low >>= 64 - bits;
+        else
+            high &= (1u << (bits - 64)) - 1;
         uint64_t denominator = 1 + (random_bits() >> random_between(22, 63)) % (1ull << 42);
         if (random_between(0, 3) == 0) denominator = 1ull << random_between(0, 42);
         check_quanta(&unit, high, low, denominator);
@@ -152,7 +155,8 @@ static void exact_powers_of_feet_and_odd_scales_are_not_rounded_further(void **s
 static void scales_at_the_ends_of_double_neither_overflow_nor_vanish(void **state) {
     (void)state;
     rqt_unit unit = UNIT_METRE;
-    const double scales[] = {DBL_MAX, -DBL_MAX, DBL_MIN, 0x1p-1074, 0x1p-300, 0x1p250, 0x1.8p-264, 0x1p-263, 0x1p-256};
+    const double scales[] = {DBL_MAX, -DBL_MAX,   DBL_MIN,  0x1p-1074, 0x1p-300,
+                             0x1p250, 0x1.8p-264, 0x1p-263, 0x1p-256};
     for (size_t n = 0; n < sizeof scales / sizeof *scales; n++) {
         unit.scale = scales[n];
         for (int d = 1; d <= 1 << 20; d *= 32) {
@@ -169,7 +173,8 @@ static void scales_at_the_ends_of_double_neither_overflow_nor_vanish(void **stat
 static void outline_costs_round_up_only(void **state) {
     (void)state;
     random_begin("ground");
-    const double special[] = {1.0, 0.1, 25.0, 1.0 / 3, DBL_MAX, DBL_MIN, 0x1p-1074, 30.922080775909325, 3.0, 0x1.fffp10};
+    const double special[] = {1.0, 0.1,       25.0, 1.0 / 3, DBL_MAX, DBL_MIN, 0x1p-1074, 30.922080775909325,
+                              3.0, 0x1.fffp10};
     const int count = (int)(sizeof special / sizeof *special);
     mpq_t exact, part;
     mpq_inits(exact, part, NULL);
@@ -191,7 +196,8 @@ static void outline_costs_round_up_only(void **state) {
         mpq_set_si(part, (long)extent, 1);
         mpq_mul(exact, exact, part);
         unsigned code = rqt_code_from_ground(extent, cell, c), right = oracle_code_up(exact);
-        CHECK(code == right, "%lld * %.17g / %.17g: code %u, should be %u", (long long)extent, cell, c, code, right);
+        CHECK(code == right, "%lld * %.17g / %.17g: code %u, should be %u", (long long)extent, cell, c, code,
+              right);
     }
     mpq_clears(exact, part, NULL);
 }

@@ -102,8 +102,8 @@ static inline const rqt_block *database_read(void *context, rqt_block_number num
 }
 
 /* What an index would return: in no particular order, chosen by summary and clamped extent. */
-static inline size_t database_answers(const database *d, const rqt_region *region, rqt_code eps, rqt_outline outline,
-                                      rqt_answer *answers) {
+static inline size_t database_answers(const database *d, const rqt_region *region, rqt_code eps,
+                                      rqt_outline outline, rqt_answer *answers) {
     int32_t x0, y0, x1, y1;
     size_t count = 0;
     if (!rqt_region_box(region, &x0, &y0, &x1, &y1)) return 0;
@@ -147,8 +147,12 @@ static inline rqt_status database_query(database *d, const rqt_region *region, r
 }
 
 /* Legal block sizes of a terrain: 0 only where nothing else fits. */
-static inline int smallest_k(const rqt_lattice *l) { return l->K == 0 ? 0 : 1; }
-static inline int largest_k(const rqt_lattice *l) { return l->K < RQT_MAX_BLOCK_K ? l->K : RQT_MAX_BLOCK_K; }
+static inline int smallest_k(const rqt_lattice *l) {
+    return l->K == 0 ? 0 : 1;
+}
+static inline int largest_k(const rqt_lattice *l) {
+    return l->K < RQT_MAX_BLOCK_K ? l->K : RQT_MAX_BLOCK_K;
+}
 
 /* ----------------------------------------------------------------------------------------- windows --
  * The union of rectangles, or a line or point (a rectangle without area is one, too). */
@@ -168,7 +172,9 @@ static inline int window_meets(const window *w, const oracle *o, const oracle_tr
     return meets;
 }
 
-static inline double samples_of(long units) { return (double)units / (double)ORACLE_UNITS; }
+static inline double samples_of(long units) {
+    return (double)units / (double)ORACLE_UNITS;
+}
 
 static inline void window_append(window *w, const char *format, ...) __attribute__((format(printf, 2, 3)));
 static inline void window_append(window *w, const char *format, ...) {
@@ -181,8 +187,8 @@ static inline void window_append(window *w, const char *format, ...) {
 }
 
 static inline void window_append_ring(window *w, double x0, double y0, double x1, double y1) {
-    window_append(w, "((%.17g %.17g, %.17g %.17g, %.17g %.17g, %.17g %.17g, %.17g %.17g))", x0, y0, x1, y0, x1, y1, x0,
-                  y1, x0, y0);
+    window_append(w, "((%.17g %.17g, %.17g %.17g, %.17g %.17g, %.17g %.17g, %.17g %.17g))", x0, y0, x1, y0, x1, y1,
+                  x0, y1, x0, y0);
 }
 
 static inline window window_all(void) {
@@ -283,9 +289,12 @@ static inline window random_window(int width, int height, int kind) {
         for (int n = 0; n < segments; n++) {
             long to_x = random_coordinate(width, grain), to_y = random_coordinate(height, grain);
             int way = random_between(0, 3);
-            if (way == 0) to_x = x;
-            else if (way == 1) to_y = y;
-            else if (way == 2) to_y = y + (to_x - x) * (random_between(0, 1) ? 1 : -1);
+            if (way == 0)
+                to_x = x;
+            else if (way == 1)
+                to_y = y;
+            else if (way == 2)
+                to_y = y + (to_x - x) * (random_between(0, 1) ? 1 : -1);
             const long segment[4] = {x, y, to_x, to_y};
             memcpy(w.segment[n], segment, sizeof segment);
             window_append(&w, ", %.17g %.17g", samples_of(to_x), samples_of(to_y));
@@ -311,7 +320,8 @@ static inline window random_window(int width, int height, int kind) {
         const long segment[4] = {x, r[1], x, r[3]};
         w.kind = "collapsed";
         window_append(&w, "POLYGON");
-        window_append_ring(&w, samples_of(x) - 0x1p-23, samples_of(r[1]), samples_of(x) + 0x1p-23, samples_of(r[3]));
+        window_append_ring(&w, samples_of(x) - 0x1p-23, samples_of(r[1]), samples_of(x) + 0x1p-23,
+                           samples_of(r[3]));
         w.segment_count = 1;
         memcpy(w.segment[0], segment, sizeof segment);
         break;
@@ -320,7 +330,9 @@ static inline window random_window(int width, int height, int kind) {
         w.kind = "empty";
         window_append(&w, "POLYGON EMPTY");
         break;
-    default: w = window_of(r); w.kind = "fractions";
+    default:
+        w = window_of(r);
+        w.kind = "fractions";
     }
     return w;
 }

@@ -26,7 +26,8 @@ static void the_root_square_is_the_smallest_that_holds_the_raster(void **state) 
     assert_int_equal(l.K, RQT_MAX_K);
     assert_int_equal(rqt_lattice_init(&l, (1 << (RQT_MAX_K - 1)) + 1, 2), RQT_OK);
     assert_int_equal(l.K, RQT_MAX_K - 1);
-    const int64_t bad[][2] = {{0, 1}, {1, 0}, {-1, 5}, {most + 1, 1}, {1, most + 1}, {INT64_MAX, 1}, {1, INT64_MIN}};
+    const int64_t bad[][2] = {{0, 1},        {1, 0},         {-1, 5},       {most + 1, 1},
+                              {1, most + 1}, {INT64_MAX, 1}, {1, INT64_MIN}};
     for (size_t n = 0; n < sizeof bad / sizeof *bad; n++)
         assert_int_equal(rqt_lattice_init(&l, bad[n][0], bad[n][1]), RQT_INVALID);
 }
@@ -56,7 +57,8 @@ static void parents_children_and_levels_equal_the_oracles_graph(void **state) {
                     const oracle_node *n = oracle_at(&o, x, y);
                     const oracle_point at = {x, y}, sample = oracle_clamp(&o, at);
                     rqt_vertex list[4];
-                    CHECK(rqt_vertex_level(&l, v) == n->level, "K=%d: level of (%d,%d) is not %d", K, x, y, n->level);
+                    CHECK(rqt_vertex_level(&l, v) == n->level, "K=%d: level of (%d,%d) is not %d", K, x, y,
+                          n->level);
                     CHECK(rqt_vertex_scale(&l, v) == K - n->level, "K=%d: scale of (%d,%d)", K, x, y);
                     int count = rqt_vertex_parents(&l, v, list);
                     CHECK(count == n->parent_count, "K=%d: (%d,%d) has %d parents", K, x, y, count);
@@ -160,8 +162,8 @@ static void a_plane_has_no_error_anywhere(void **state) {
     (void)state;
     random_begin("plane");
     for (int n = 0; n < 60; n++) {
-        raster r = raster_make(n % 4 ? SURFACE_PLANE : SURFACE_CONSTANT, random_between(1, 70), random_between(1, 70),
-                               -1);
+        raster r =
+            raster_make(n % 4 ? SURFACE_PLANE : SURFACE_CONSTANT, random_between(1, 70), random_between(1, 70), -1);
         rqt_errors errors;
         rqt_grid grid = {.q = r.q};
         assert_int_equal(rqt_lattice_init(&grid.lattice, r.width, r.height), RQT_OK);
@@ -241,8 +243,8 @@ static void errors_can_be_stopped_and_leave_nothing(void **state) {
 
 /* --------------------------------------------------------------------------------------- selection -- */
 
-static void check_selection(const model *m, const rqt_selection *selection, const unsigned char *set, const char *how,
-                            unsigned eps) {
+static void check_selection(const model *m, const rqt_selection *selection, const unsigned char *set,
+                            const char *how, unsigned eps) {
     size_t count = 0;
     for (int y = 0; y < m->o.side; y++) {
         for (int x = 0; x < m->o.side; x++) {
@@ -309,8 +311,9 @@ static void algorithms_1_and_2_and_a_threshold_select_the_same(void **state) {
     random_begin("selections");
     for (int n = 0; n < 250; n++) {
         int side = n % 10 == 0 ? 40 : 20;
-        check_all_selections_agree(raster_make((surface)random_between(0, SURFACE_COUNT - 1), random_between(1, side),
-                                               random_between(1, side), random_between(-1, 10)));
+        check_all_selections_agree(raster_make((surface)random_between(0, SURFACE_COUNT - 1),
+                                               random_between(1, side), random_between(1, side),
+                                               random_between(-1, 10)));
     }
     check_all_selections_agree(raster_make(SURFACE_TAKAGI, 65, 65, -1));
     check_all_selections_agree(raster_make(SURFACE_NOISE, 65, 50, 1));

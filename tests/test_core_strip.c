@@ -24,8 +24,9 @@ static void check_strip(const rqt_patch *p, size_t *length) {
     CHECK(found == p->triangle_count, "the strip has %zu triangles, the patch %zu", found, p->triangle_count);
     for (size_t t = 0; t < found; t++)
         CHECK(ordered_keys(&from_strip[t], &from_patch[t]) == 0,
-              "strip has (%d %d %d) where the patch has (%d %d %d)", (int)from_strip[t].v[0], (int)from_strip[t].v[1],
-              (int)from_strip[t].v[2], (int)from_patch[t].v[0], (int)from_patch[t].v[1], (int)from_patch[t].v[2]);
+              "strip has (%d %d %d) where the patch has (%d %d %d)", (int)from_strip[t].v[0],
+              (int)from_strip[t].v[1], (int)from_strip[t].v[2], (int)from_patch[t].v[0], (int)from_patch[t].v[1],
+              (int)from_patch[t].v[2]);
     free(from_strip);
     free(from_patch);
     (void)test_allocator.resize(test_allocator.context, strip, 0);
@@ -52,7 +53,8 @@ static void bare_triangles_in_any_order_make_a_strip(void **state) {
     for (int round = 0; round < 300; round++) {
         p.vertex_count = (size_t)random_between(3, 60);
         p.triangle_count = (size_t)random_between(1, 50);
-        for (size_t v = 0; v < p.vertex_count; v++) vertices[v].col = (int32_t)v, vertices[v].row = (int32_t)(v * v);
+        for (size_t v = 0; v < p.vertex_count; v++)
+            vertices[v].col = (int32_t)v, vertices[v].row = (int32_t)(v * v);
         for (size_t t = 0; t < p.triangle_count; t++) {
             uint32_t *v = &triangles[3 * t];
             do
@@ -73,18 +75,20 @@ static void strips_of_patches_are_the_patches(void **state) {
                                random_between(2, 34), random_between(-1, 8));
         if (round % 3 == 0) raster_add_lake(&r);
         model_create(&m, r);
-        assert_int_equal(database_create(&d, &m, random_between(smallest_k(&m.grid.lattice), m.grid.lattice.K),
-                                         &test_allocator), RQT_OK);
+        assert_int_equal(
+            database_create(&d, &m, random_between(smallest_k(&m.grid.lattice), m.grid.lattice.K), &test_allocator),
+            RQT_OK);
         for (int w = 0; w < 6; w++) {
-            window in = w < 2 ? window_all()
-                              : random_window(m.r.width, m.r.height, random_between(0, WINDOW_KINDS - 1));
+            window in =
+                w < 2 ? window_all() : random_window(m.r.width, m.r.height, random_between(0, WINDOW_KINDS - 1));
             rqt_region *region = region_of(&in, &m.grid.lattice);
             rqt_patch patch;
             size_t n;
             unsigned code = oracle_at(&m.o, random_between(0, m.o.side - 1), random_between(0, m.o.side - 1))->code;
             rqt_code eps = w == 0 || code > RQT_CODE_LARGEST ? 0 : (rqt_code)code;
             assert_int_equal(database_query(&d, region, eps, RQT_SELECT_THRESHOLD, (rqt_outline)(w % 2),
-                                            &test_allocator, &patch), RQT_OK);
+                                            &test_allocator, &patch),
+                             RQT_OK);
             check_strip(&patch, &n);
             rqt_patch_free(&patch);
             rqt_region_free(region);
@@ -107,17 +111,21 @@ static void a_full_mesh_costs_less_than_one_and_three_quarter_indices_a_triangle
         size_t length;
         /* the oracle has nothing to say here, and is slow at this size */
         assert_int_equal(rqt_lattice_init(&m.grid.lattice, r.width, r.height), RQT_OK);
-        assert_int_equal(rqt_errors_compute(&m.grid, &r.unit, &r.cost, &test_allocator, NULL, NULL, &errors), RQT_OK);
+        assert_int_equal(rqt_errors_compute(&m.grid, &r.unit, &r.cost, &test_allocator, NULL, NULL, &errors),
+                         RQT_OK);
         rqt_errors_saturate(&errors);
         m.saturated = errors;
         assert_int_equal(database_create(&d, &m, 5, &test_allocator), RQT_OK);
         window all = window_all();
         rqt_region *region = region_of(&all, &m.grid.lattice);
         for (int round = 0; round < 2; round++) {
-            rqt_code eps = round == 0 ? 0 : rqt_code_floor(rqt_code_metres(rqt_errors_at(
-                                                &errors, (rqt_vertex){31, 33}, &(bool){false})) / 2);
-            assert_int_equal(database_query(&d, region, eps, RQT_SELECT_THRESHOLD, RQT_OUTLINE_EXACT, &test_allocator,
-                                            &patch), RQT_OK);
+            rqt_code eps =
+                round == 0 ? 0
+                           : rqt_code_floor(
+                                 rqt_code_metres(rqt_errors_at(&errors, (rqt_vertex){31, 33}, &(bool){false})) / 2);
+            assert_int_equal(
+                database_query(&d, region, eps, RQT_SELECT_THRESHOLD, RQT_OUTLINE_EXACT, &test_allocator, &patch),
+                RQT_OK);
             assert_true(patch.triangle_count > 5000);
             check_strip(&patch, &length);
             double each = (double)length / (double)patch.triangle_count;

@@ -1,8 +1,9 @@
 /* test_core_support.h - what the test programs of the core share: random numbers, a counting heap, rasters made in
  * memory, and a raster with everything that the oracle and the core say about it.
  *
- * Only headers, so that every test program is one source file plus oracle.c. Random numbers come from one generator,
- * started anew for each test from RQT_SEED and the test's own name: a test fails alike alone and among others. */
+ * Only headers, so that every test program is one source file plus oracle.c. Random numbers come from one
+ * generator, started anew for each test from RQT_SEED and the test's own name: a test fails alike alone and among
+ * others. */
 #ifndef TEST_CORE_SUPPORT_H
 #define TEST_CORE_SUPPORT_H
 
@@ -21,12 +22,12 @@
 #include "rqt.h"
 
 /* A failed check says where and with what; nothing is formatted when it holds. */
-#define CHECK(condition, ...)                                                                                          \
-    do {                                                                                                               \
-        if (!(condition)) {                                                                                            \
-            print_error("failed: %s\n", #condition);                                                                   \
-            fail_msg(__VA_ARGS__);                                                                                     \
-        }                                                                                                              \
+#define CHECK(condition, ...)                        \
+    do {                                             \
+        if (!(condition)) {                          \
+            print_error("failed: %s\n", #condition); \
+            fail_msg(__VA_ARGS__);                   \
+        }                                            \
     } while (0)
 
 /* ------------------------------------------------------------------------------------------ random -- */
@@ -56,7 +57,9 @@ static inline int random_between(int low, int high) {
     return low + (int)(random_bits() % (uint64_t)((int64_t)high - low + 1));
 }
 
-static inline double random_unit(void) { return (double)(random_bits() >> 11) / 9007199254740992.0; }
+static inline double random_unit(void) {
+    return (double)(random_bits() >> 11) / 9007199254740992.0;
+}
 
 /* -------------------------------------------------------------------------------------------- heap --
  * An allocator that counts what is alive, and says no when asked to. */
@@ -129,8 +132,10 @@ static inline raster raster_from_memory(int width, int height, const int32_t *q,
     size_t n = (size_t)(width * height);
     r.q = malloc(n * sizeof *r.q);
     if (!r.q) abort();
-    if (q) memcpy(r.q, q, n * sizeof *r.q);
-    else memset(r.q, 0, n * sizeof *r.q);
+    if (q)
+        memcpy(r.q, q, n * sizeof *r.q);
+    else
+        memset(r.q, 0, n * sizeof *r.q);
     if (valid) {
         r.valid = malloc(n);
         if (!r.valid) abort();
@@ -153,8 +158,10 @@ static inline void raster_print(const raster *r) {
     for (int y = 0; y < r->height; y++) {
         for (int x = 0; x < r->width; x++) {
             int n = y * r->width + x;
-            if (r->valid && !r->valid[n]) print_error(" void");
-            else print_error(" %d", (int)r->q[n]);
+            if (r->valid && !r->valid[n])
+                print_error(" void");
+            else
+                print_error(" %d", (int)r->q[n]);
         }
         print_error("\n");
     }
@@ -179,8 +186,9 @@ typedef enum surface {
 } surface;
 
 static const char *const surface_names[SURFACE_COUNT] = {
-    "noise", "constant", "plane",         "takagi",       "spike at a corner", "spike at a border", "spike",
-    "pit",   "cliff",    "slanted cliff", "checkerboard", "ridge",             "extremes",          "hills"};
+    "noise",    "constant", "plane", "takagi",        "spike at a corner", "spike at a border",
+    "spike",    "pit",      "cliff", "slanted cliff", "checkerboard",      "ridge",
+    "extremes", "hills"};
 
 /* The surface on which errors against the next coarser edge mislead most: tents over tents, all heights even. */
 static inline int takagi(int x, int y, int side) {
@@ -195,24 +203,36 @@ static inline int takagi(int x, int y, int side) {
 static inline int32_t surface_height(surface s, int x, int y, int width, int height, const int parameter[4]) {
     int spike = parameter[2];
     switch (s) {
-    case SURFACE_NOISE: return random_between(-100, 100);
-    case SURFACE_CONSTANT: return parameter[0];
-    case SURFACE_PLANE: return parameter[2] + 2 * parameter[0] * x + x + 2 * parameter[1] * y - y;
-    case SURFACE_TAKAGI: return takagi(x, y, 64);
-    case SURFACE_SPIKE_CORNER: return x == (parameter[0] & 1) * (width - 1) && y == (parameter[1] & 1) * (height - 1)
-                                          ? spike : 0;
-    case SURFACE_SPIKE_BORDER: return x == (parameter[0] & 0xFF) % width && y == height - 1 ? spike : 0;
+    case SURFACE_NOISE:
+        return random_between(-100, 100);
+    case SURFACE_CONSTANT:
+        return parameter[0];
+    case SURFACE_PLANE:
+        return parameter[2] + 2 * parameter[0] * x + x + 2 * parameter[1] * y - y;
+    case SURFACE_TAKAGI:
+        return takagi(x, y, 64);
+    case SURFACE_SPIKE_CORNER:
+        return x == (parameter[0] & 1) * (width - 1) && y == (parameter[1] & 1) * (height - 1) ? spike : 0;
+    case SURFACE_SPIKE_BORDER:
+        return x == (parameter[0] & 0xFF) % width && y == height - 1 ? spike : 0;
     case SURFACE_SPIKE_INTERIOR:
         return x == (parameter[0] & 0xFF) % width && y == (parameter[1] & 0xFF) % height ? spike : 0;
-    case SURFACE_PIT: return x == (width | 1) / 2 + 1 && y == (height | 1) / 2 - 1 ? -1 : 1000;
-    case SURFACE_CLIFF: return x > (parameter[0] & 0xFF) % width ? 500 : -3;
-    case SURFACE_CLIFF_SLANTED: return 3 * x + (parameter[1] & 7) * y > 2 * width ? 800 : 0;
-    case SURFACE_CHECKERBOARD: return ((x ^ y) & 1) * 77;
-    case SURFACE_RIDGE: return -abs(x + y - width) * 13;
-    case SURFACE_EXTREMES: return random_between(0, 1) ? RQT_HEIGHT_LIMIT - 1 : 1 - RQT_HEIGHT_LIMIT;
+    case SURFACE_PIT:
+        return x == (width | 1) / 2 + 1 && y == (height | 1) / 2 - 1 ? -1 : 1000;
+    case SURFACE_CLIFF:
+        return x > (parameter[0] & 0xFF) % width ? 500 : -3;
+    case SURFACE_CLIFF_SLANTED:
+        return 3 * x + (parameter[1] & 7) * y > 2 * width ? 800 : 0;
+    case SURFACE_CHECKERBOARD:
+        return ((x ^ y) & 1) * 77;
+    case SURFACE_RIDGE:
+        return -abs(x + y - width) * 13;
+    case SURFACE_EXTREMES:
+        return random_between(0, 1) ? RQT_HEIGHT_LIMIT - 1 : 1 - RQT_HEIGHT_LIMIT;
     case SURFACE_HILLS:
         return (takagi(x, y, 16) * 3 + takagi(x + 5, y + 11, 64) * 7 + x * y / 3) + random_between(0, 3);
-    default: return 0;
+    default:
+        return 0;
     }
 }
 
@@ -270,8 +290,8 @@ static inline void model_create(model *m, raster r) {
     m->grid.q = r.q;
     m->grid.valid = r.valid;
     assert_int_equal(rqt_errors_compute(&m->grid, &r.unit, &r.cost, &test_allocator, NULL, NULL, &m->raw), RQT_OK);
-    assert_int_equal(
-        rqt_errors_compute(&m->grid, &r.unit, &r.cost, &test_allocator, NULL, NULL, &m->saturated), RQT_OK);
+    assert_int_equal(rqt_errors_compute(&m->grid, &r.unit, &r.cost, &test_allocator, NULL, NULL, &m->saturated),
+                     RQT_OK);
     rqt_errors_saturate(&m->saturated);
 }
 
@@ -300,8 +320,8 @@ static inline void check_errors_equal_oracle(raster r) {
                 outline == (n->outline != 0))
                 continue;
             raster_print(&m.r);
-            fail_msg("vertex (%d,%d): raw %u outline %d, saturated %u outline %d; should be %u %d, %u %d", x, y, raw,
-                     raw_outline, code, outline, n->raw_code, n->raw_outline, n->code, n->outline);
+            fail_msg("vertex (%d,%d): raw %u outline %d, saturated %u outline %d; should be %u %d, %u %d", x, y,
+                     raw, raw_outline, code, outline, n->raw_code, n->raw_outline, n->code, n->outline);
         }
     }
     CHECK(m.raw.any_outline == any && m.saturated.any_outline == any, "any_outline is not %d", any);

@@ -306,11 +306,14 @@ static void read_any(format_kind kind, const uint8_t *bytes, size_t size, triang
 
 /* ----------------------------------------------------------------------------------------------- comparing -- */
 
-static int compare_corners(const void *a, const void *b) {
-    return memcmp(a, b, sizeof(double[3]));
+static int compare_doubles(const double *a, const double *b, size_t n) {
+    for (size_t i = 0; i < n; i++)
+        if (a[i] != b[i]) return a[i] < b[i] ? -1 : 1;
+    return 0;
 }
+
 static int compare_triangles(const void *a, const void *b) {
-    return memcmp(a, b, sizeof(double[3][3]));
+    return compare_doubles(a, b, 9);
 }
 
 /* The smallest corner first, the direction kept; then all in order. */
@@ -319,7 +322,7 @@ static void normalize(triangles *t) {
         double(*c)[3] = t->corner + 3 * i, turned[3][3];
         size_t first = 0;
         for (size_t j = 1; j < 3; j++)
-            if (compare_corners(*c + 3 * j, *c + 3 * first) < 0) first = j;
+            if (compare_doubles(c[j], c[first], 3) < 0) first = j;
         for (size_t j = 0; j < 3; j++) memcpy(turned[j], c[(first + j) % 3], sizeof *c);
         memcpy(c, turned, sizeof turned);
     }
@@ -440,7 +443,7 @@ static void test_box_is_of_the_triangles(void **state) {
         uint8_t *bytes = write_patch(&s, kinds[k], &size);
         triangles t;
         read_any(kinds[k], bytes, size, &t);
-        if (s.patch.triangles[0] < 3) check_equal(&s, &t);
+        check_equal(&s, &t);
         free(t.corner);
         release(&s, bytes);
     }
@@ -531,11 +534,11 @@ static void test_ogr_reads_it(void **state) {
     }
 }
 
-/* The one value of `sql` with the bytes as ?1, as text; "" for NULL. */
+/* The one value of `sql`, with the bytes (if any) as ?1, as text; "" for NULL. */
 static void ask(sqlite3 *db, const char *sql, const uint8_t *bytes, size_t size, const char *right) {
     sqlite3_stmt *statement;
     assert_int_equal(sqlite3_prepare_v2(db, sql, -1, &statement, NULL), SQLITE_OK);
-    assert_int_equal(sqlite3_bind_blob(statement, 1, bytes, (int)size, SQLITE_STATIC), SQLITE_OK);
+    if (bytes) assert_int_equal(sqlite3_bind_blob(statement, 1, bytes, (int)size, SQLITE_STATIC), SQLITE_OK);
     assert_int_equal(sqlite3_step(statement), SQLITE_ROW);
     const char *text = (const char *)sqlite3_column_text(statement, 0);
     assert_string_equal(text ? text : "", right);
@@ -582,7 +585,7 @@ static void test_spatialite_reads_it(void **state) {
         bytes = write_patch(&s, FORMAT_GPKG, &size);
         ask(db, "SELECT IsValidGPB(?1)", bytes, size, "1");
         if (n) ask(db, "SELECT ST_NumGeometries(GeomFromGPB(?1))", bytes, size, count);
-        ask(db, "SELECT ST_IsEmpty(?1)", bytes, size, n ? "0" : "1");
+        ask(db, "SELECT ST_IsEmpty(?1) <> 0", bytes, size, n ? "0" : "1"); /* 5.0 says 16, the flag itself */
         release(&s, bytes);
         patch_end(&s);
     }
@@ -732,10 +735,11 @@ static void test_too_large(void **state) {
     patch_end(&s);
 }
 
-/* An obj is as long as its digits: known only by printing, and still refused before memory is asked for. */
+/* An obj is as long as its digits (here 74 a line): known only by printing, and still refused before memory is
+ * asked for. */
 static void test_obj_too_large(void **state) {
     (void)state;
-    enum { VERTICES = 28000000 };
+    enum { VERTICES = 29100000 };
     sample_patch s;
     patch_begin(&s, 1, 0);
     rqt_patch_vertex *vertices = calloc(VERTICES, sizeof *vertices);
@@ -743,9 +747,9 @@ static void test_obj_too_large(void **state) {
     free(s.patch.vertices);
     s.patch.vertices = vertices;
     s.patch.vertex_count = VERTICES;
-    s.frame.placement = (rqt_placement){-1.2345678901234567e-200, -1.2345678901234567e-200, 1, -1};
-    s.frame.unit = (rqt_unit){0, 1, 1, 1, 1, -1.2345678901234567e-200};
-    vertices[0].col = 1; /* "v 1 ..." and then lines of 78 bytes */
+    const double longest = -0.00012345678901234567;
+    s.frame.placement = (rqt_placement){longest, longest, 1, -1};
+    s.frame.unit = (rqt_unit){0, 1, 1, 1, 1, longest};
     uint8_t *bytes;
     size_t size;
     assert_int_equal(format_patch(&s.patch, &s.frame, FORMAT_OBJ, &s.allocator, &bytes, &size), RQT_INVALID);

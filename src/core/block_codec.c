@@ -13,7 +13,6 @@
 
 #include <math.h>
 #include <zstd.h>
-#include <zstd_errors.h>
 
 enum {
     AT_VERSION = 4,

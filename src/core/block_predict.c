@@ -72,10 +72,13 @@ static inline rqt_code code_near_above(float v) {
     return (rqt_code)(bits ? code : 0);
 }
 
-/* What z differs from the midpoint of a and b: |2z - a - b| times half, as a code. */
-static inline rqt_code midpoint_code(int32_t z, int32_t a, int32_t b, float half) {
-    uint32_t twice = 2 * (uint32_t)z - (uint32_t)a - (uint32_t)b;
-    return code_near_above(fabsf((float)(int32_t)twice) * half);
+/* What z differs from the midpoint of two heights with this sum: |2z - sum| times half, as a code. */
+static inline rqt_code midpoint_code(int32_t z, uint32_t sum, float half) {
+    return code_near_above(fabsf((float)(int32_t)(2 * (uint32_t)z - sum)) * half);
+}
+
+static inline uint32_t sum_of(int32_t a, int32_t b) {
+    return (uint32_t)a + (uint32_t)b;
 }
 
 static inline rqt_code larger(rqt_code a, rqt_code b) {
@@ -132,7 +135,7 @@ static void code_scale_of_errors(bool restoring, const int32_t *heights, int str
     for (int j = 0; j <= n; j++) {
         int32_t *e = next + (ptrdiff_t)j * (n + 1);
         split(heights + (ptrdiff_t)2 * j * stride, n, e, odd);
-        for (int i = 0; i < n; i++) p[i] = midpoint_code(odd[i], e[i], e[i + 1], half);
+        for (int i = 0; i < n; i++) p[i] = midpoint_code(odd[i], sum_of(e[i], e[i + 1]), half);
         if (centres) {
             raise_h(p, n, j > 0 ? centres + (ptrdiff_t)(2 * j - 1) * 2 * n : NULL);
             raise_h(p, n, j < n ? centres + (ptrdiff_t)(2 * j) * 2 * n : NULL);
@@ -143,7 +146,7 @@ static void code_scale_of_errors(bool restoring, const int32_t *heights, int str
         const int32_t *above = next + (ptrdiff_t)j * (n + 1), *below = above + n + 1;
         rqt_code *h = code + j * pair, *v = h + n, *c = code + first_centre + (ptrdiff_t)j * n;
         split(heights + (ptrdiff_t)(2 * j + 1) * stride, n, even, odd);
-        for (int i = 0; i <= n; i++) p[i] = midpoint_code(even[i], above[i], below[i], half);
+        for (int i = 0; i <= n; i++) p[i] = midpoint_code(even[i], sum_of(above[i], below[i]), half);
         if (centres) {
             raise_v(p, n, centres + (ptrdiff_t)(2 * j) * 2 * n);
             raise_v(p, n, centres + (ptrdiff_t)(2 * j + 1) * 2 * n);
@@ -155,9 +158,10 @@ static void code_scale_of_errors(bool restoring, const int32_t *heights, int str
             p[0] = 0;
         } else {
             for (int i = 0; i < n; i++) {
-                bool other = (i ^ j) & 1;
-                p[i] =
-                    midpoint_code(odd[i], other ? above[i + 1] : above[i], other ? below[i] : below[i + 1], half);
+                const uint32_t other = 0 - (uint32_t)((i ^ j) & 1); /* a mask: a branch would be slower */
+                const uint32_t sum =
+                    (sum_of(above[i], below[i + 1]) & ~other) | (sum_of(above[i + 1], below[i]) & other);
+                p[i] = midpoint_code(odd[i], sum, half);
             }
         }
         const rqt_code *h_below = h + pair;

@@ -9,12 +9,12 @@
  * 2^53 and 3 <= s <= 69, and with k decimals v is N / 2^s for N = m * 10^k, k <= 21: N < 2^123 fits 128 bits. The
  * candidate is D = N / 2^s rounded to nearest; it reads back as v iff it is within half a step of doubles, that is
  * iff |D * 2^s - N| is less than 10^k / 2 (equal will do when m is even: ties read to even). Below a power of two
- * the doubles are twice as dense, so there the lower half is a quarter; and there the nearest candidate can miss on
- * that side while the next one above, though further off, reads back.
+ * doubles are twice as dense, but the powers in this range are decimals of at most 15 digits, so D is exact there.
  *
- * The rest (tiny, huge, subnormal) is printed and read back by the C library. Both sides of that use the same
- * locale; only digits and the exponent are taken from the text, so it does not matter what the locale's decimal
- * point is.
+ * The rest (tiny, huge, subnormal) is printed and read back by the C library. There a power of two needs care: the
+ * nearest 16 digits may lie below it and miss, while the next ones above, though further off, read back. Both sides
+ * use the same locale, and only digits and the exponent are taken from the text, so it does not matter what the
+ * locale's decimal point is.
  */
 #include "internal.h"
 
@@ -53,12 +53,6 @@ static u128 power_of_ten(int k) {
     return k < 16 ? POWERS[k] : (u128)POWERS[15] * POWERS[k - 15];
 }
 
-/* Does D, `distance` * 2^-s from N, read back? step is 10^k, the distance of two doubles in the same measure. */
-static bool reads_back(u128 distance, u128 step, uint64_t m, bool below) {
-    if (below && m == (uint64_t)1 << 52) return 4 * distance <= step;
-    return 2 * distance < step || (2 * distance == step && m % 2 == 0);
-}
-
 /* 1e-5 <= v < 1e15, by integers. */
 static void shortest_usual(double v, decimal *out) {
     uint64_t bits;
@@ -80,12 +74,12 @@ static void shortest_usual(double v, decimal *out) {
         k = wanted - 1 - exponent;
         u128 step = power_of_ten(k), N = m * step;
         D = (uint64_t)(N >> s);
-        u128 over = N - ((u128)D << s), short_of = one - over; /* distances of D and D + 1 */
-        bool up = over > short_of || (over == short_of && D % 2);
-        if (!up && !reads_back(over, step, m, true)) up = true;
-        if (up && wanted < MOST && !reads_back(short_of, step, m, false)) continue;
-        if (up) D++;
-        break;
+        u128 distance = N - ((u128)D << s);
+        if (2 * distance > one || (2 * distance == one && D % 2)) {
+            D++;
+            distance = one - distance;
+        }
+        if (wanted == MOST || 2 * distance < step || (2 * distance == step && m % 2 == 0)) break;
     }
     out->n = format_digits(D, out->digits);
     out->exponent = out->n - 1 - k;

@@ -227,7 +227,7 @@ static bool compute_errors(import *m) {
     if (status != RQT_OK) return import_refuse(&m->job, "errors cannot be computed (status %d)", (int)status);
     rqt_errors_saturate(&m->errors);
     m->report->seconds_errors = now() - start;
-    return true;
+    return import_progress(&m->job, "errors", 1, sample_count(m));
 }
 
 static rqt_code largest_error(const rqt_errors *errors) {

@@ -46,8 +46,11 @@ typedef struct voids {
 static void voids_add(voids *v, const import_source *s, double value, int64_t integer) {
     /* A nodata value has been through decimal text: in float32 it may be an ulp or two off, as GDAL has it; one as
      * large as the largest floats is often cut to a few digits, and no height is that large. */
-    double slack = s->is_float && s->is_single ? 4 * (double)FLT_EPSILON * fabs(value) : 0;
-    if (fabs(value) > 1e30 && isfinite(value)) slack = 1e-5 * fabs(value);
+    double slack = 0;
+    if (fabs(value) > 1e30)
+        slack = isinf(value) ? 0 : 1e-5 * fabs(value);
+    else if (s->is_float && s->is_single)
+        slack = 4 * (double)FLT_EPSILON * fabs(value);
     v->value[v->count] = value;
     v->slack[v->count] = slack;
     v->integer[v->count++] = integer;

@@ -26,6 +26,7 @@ struct store {
     int count;
     bool known;       /* terrains are read, and the cache holds only what is theirs */
     uint64_t version; /* of all databases, when they were read */
+    sqlite3_stmt *look; /* reads a word of the main database */
     block_cache *cache;
     rqt_codec *codec;
 };
@@ -66,6 +67,8 @@ static void finalize(statements *p) {
 }
 
 void store_release(store *s) {
+    sqlite3_finalize(s->look);
+    s->look = NULL;
     for (int i = 0; i < s->count; i++) finalize(&s->statements[i]);
 }
 
@@ -88,14 +91,34 @@ void store_close(store *s) {
     sqlite3_free(s);
 }
 
+/* Begin a read of a database for a moment: only then does SQLite look whether others have changed it. */
+static void look(store *s, int i, const char *name) {
+    if (i == 0 && s->look) {
+        (void)sqlite3_step(s->look);
+        (void)sqlite3_reset(s->look);
+        return;
+    }
+    char *sql = sqlite3_mprintf("SELECT 1 FROM \"%w\".sqlite_schema LIMIT 1", name);
+    sqlite3_stmt *once = NULL;
+    if (sql && sqlite3_prepare_v3(s->db, sql, -1, SQLITE_PREPARE_PERSISTENT, &once, NULL) == SQLITE_OK) (void)sqlite3_step(once);
+    sqlite3_free(sql);
+    (void)sqlite3_reset(once);
+    if (i == 0)
+        s->look = once; /* the main database is asked often */
+    else
+        sqlite3_finalize(once);
+}
+
 /* A number that changes when any database of the connection does, or one is attached or detached. */
-static uint64_t version_of(sqlite3 *db, bool *writing) {
+static uint64_t version_of(store *s, bool *writing) {
+    sqlite3 *db = s->db;
     uint64_t h = 0;
     *writing = false;
     for (int i = 0;; i++) {
         const char *name = sqlite3_db_name(db, i);
         if (!name) return h;
         if (i == 1) continue; /* temp */
+        if (sqlite3_txn_state(db, name) == SQLITE_TXN_NONE) look(s, i, name);
         unsigned version = 0;
         (void)sqlite3_file_control(db, name, SQLITE_FCNTL_DATA_VERSION, &version);
         h = (h ^ version) * UINT64_C(0x9E3779B97F4A7C15);
@@ -106,7 +129,7 @@ static uint64_t version_of(sqlite3 *db, bool *writing) {
 
 static int refresh(store *s, char **error) {
     bool writing;
-    uint64_t version = version_of(s->db, &writing);
+    uint64_t version = version_of(s, &writing);
     if (s->known && !writing && version == s->version) return SQLITE_OK;
     forget(s);
     int code = store_read_terrains(s->db, &s->terrains, &s->count, error);
@@ -123,7 +146,7 @@ static int refresh(store *s, char **error) {
         memset(s->statements, 0, bytes);
     }
     /* The version that a statement of ours has just seen: the file may have changed since it was asked for above. */
-    s->version = version_of(s->db, &writing);
+    s->version = version_of(s, &writing);
     s->known = !writing && s->version == version;
     return SQLITE_OK;
 }

@@ -1,0 +1,69 @@
+/* connection.c - what rqt keeps per connection, and how it lets the connection close.
+ *
+ * The store keeps prepared statements, and sqlite3_close refuses while there are any. SQLite disconnects virtual tables
+ * before it looks, so the statements belong to one of ours, rqt_terrains: as long as it is connected they may stay, and when
+ * it is disconnected they go. A scalar function that comes first connects it by preparing a statement on it.
+ */
+#include "functions.h"
+
+#include <stdarg.h>
+
+struct connection {
+    sqlite3 *db;
+    store *store;
+    int holders;
+    bool owned; /* rqt_terrains is connected */
+};
+
+connection *connection_create(sqlite3 *db) {
+    connection *c = sqlite3_malloc(sizeof *c);
+    if (!c) return NULL;
+    *c = (connection){.db = db, .holders = 1};
+    return c;
+}
+
+sqlite3 *connection_db(const connection *c) { return c->db; }
+
+void connection_hold(connection *c) { c->holders++; }
+
+void connection_release(void *p) {
+    connection *c = p;
+    if (--c->holders > 0) return;
+    store_close(c->store);
+    sqlite3_free(c);
+}
+
+void connection_owner(connection *c, bool owned) {
+    c->owned = owned;
+    if (!owned && c->store) store_release(c->store);
+}
+
+int connection_store(connection *c, store **s, char **error) {
+    if (!c->store) {
+        const int code = store_open(c->db, &c->store);
+        if (code != SQLITE_OK) return code;
+    }
+    if (!c->owned) {
+        sqlite3_stmt *connects = NULL;
+        const int code = sqlite3_prepare_v2(c->db, "SELECT 1 FROM rqt_terrains WHERE 0", -1, &connects, NULL);
+        sqlite3_finalize(connects);
+        if ((code & 0xFF) == SQLITE_NOMEM) return SQLITE_NOMEM;
+    }
+    (void)error;
+    *s = c->store;
+    return SQLITE_OK;
+}
+
+void connection_done(connection *c) {
+    if (!c->owned && c->store) store_release(c->store);
+}
+
+int fail(char **error, const char *format, ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    char *text = sqlite3_vmprintf(format, arguments);
+    va_end(arguments);
+    sqlite3_free(*error);
+    *error = text;
+    return text ? SQLITE_ERROR : SQLITE_NOMEM;
+}

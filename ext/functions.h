@@ -1,0 +1,93 @@
+/* functions.h - how an SQL function is described, and what all of them share.
+ *
+ * functions.c holds the table: name, arguments, purity with its reason, one line of documentation, an example. The
+ * registration, rqt_help and the reference (ext/SQL.md) come from it, and the tests run every example.
+ */
+#ifndef RQT_FUNCTIONS_H
+#define RQT_FUNCTIONS_H
+
+#include "store.h"
+
+/* -------------------------------------------------------------------------------------- one connection */
+typedef struct connection connection;
+
+sqlite3 *connection_db(const connection *c);
+/* The store, ready for use. Pair with connection_done, which lets go of what could keep the database from closing. */
+int connection_store(connection *c, store **s, char **error);
+void connection_done(connection *c);
+
+/* ------------------------------------------------------------------------------------------- functions */
+/* The rows of one call of a table-valued function. */
+typedef struct row_set {
+    size_t count;
+    void *data;
+    void (*column)(void *data, size_t row, int column, sqlite3_context *result);
+    void (*release)(void *data); /* may be NULL */
+} row_set;
+
+/* Fill rows from the arguments (missing optional ones are NULL pointers); on failure *error is a sentence without the
+ * function's name. */
+typedef int fill_rows(connection *c, sqlite3_value **arguments, row_set *rows, char **error);
+
+typedef void scalar_call(sqlite3_context *result, int count, sqlite3_value **arguments);
+
+typedef struct function {
+    const char *name;
+    const char *arguments; /* "region, eps [, terrain [, options]]" */
+    const char *returns;   /* what a scalar gives; the columns of a table */
+    const char *purpose;   /* one line */
+    const char *example;   /* SQL that runs in the demo database */
+    /* scalars */
+    scalar_call *call;
+    int least, most; /* arguments */
+    int flags;       /* SQLITE_DETERMINISTIC, SQLITE_INNOCUOUS, SQLITE_DIRECTONLY */
+    /* tables */
+    fill_rows *fill;
+    const char *hidden;    /* further columns that exist but do not show in SELECT * */
+    bool keeps_statements; /* the table that owns the connection's prepared statements */
+} function;
+
+extern const function rqt_functions[];
+extern const int rqt_function_count;
+
+/* Register a table-valued function. table.c */
+int table_register(connection *c, const function *f);
+/* Put "name(): sentence" (or what code says) as the result of a scalar, and release the sentence. scalar.c */
+void scalar_error(sqlite3_context *result, const char *name, int code, char *sentence);
+/* connection.c */
+void connection_hold(connection *c);
+void connection_release(void *c);
+void connection_owner(connection *c, bool owned);
+
+/* -------------------------------------------------------------------------------- requests for a patch */
+/* region, eps, terrain, options, as every mesh function takes them. request.c */
+typedef struct request {
+    store *store;
+    const store_terrain *terrain;
+    rqt_geometry *geometry;
+    rqt_region *region;
+    double eps;
+    store_query_options options;
+} request;
+
+int request_read(connection *c, sqlite3_value *region, sqlite3_value *eps, sqlite3_value *terrain,
+                 sqlite3_value *options, request *out, char **error);
+int request_patch(request *r, rqt_patch *patch, store_reads *reads, char **error);
+void request_free(request *r);
+/* The terrain that a value names; NULL value: the only one. */
+int request_terrain(store *s, sqlite3_value *name, const store_terrain **terrain, char **error);
+/* "what must be a number ...": false and a sentence when the value is none, or NaN. */
+bool request_number(sqlite3_value *value, const char *what, double *number, char **error);
+/* Options of the contract; sentences name what is unknown and what is not in this version. options.c */
+int options_read(const char *json, store_query_options *options, char **error);
+
+/* A sentence into *error; returns SQLITE_ERROR, or SQLITE_NOMEM. */
+int fail(char **error, const char *format, ...);
+
+/* The functions themselves, by file. */
+fill_rows fill_range, fill_triangles, fill_strip;                     /* mesh_tables.c */
+fill_rows fill_terrains, fill_explain, fill_verify, fill_check, fill_help; /* insight_tables.c, verify_table.c */
+scalar_call call_version, call_build_info, call_bbox, call_circle, call_mesh, call_height; /* scalar.c */
+scalar_call call_block_info, call_block_check, call_block_dump;       /* block_functions.c */
+
+#endif

@@ -1,0 +1,250 @@
+/* insight_tables.c - tables about the terrains themselves: rqt_terrains, rqt_explain, rqt_check, rqt_help. */
+#include "functions.h"
+
+#include "format.h"
+
+#include <math.h>
+#include <string.h>
+
+/* ----------------------------------------------------------------------------------------- rqt_terrains */
+typedef struct terrain_list {
+    store_terrain *rows;
+    int count;
+} terrain_list;
+
+static void release_terrains(void *data) {
+    terrain_list *list = data;
+    store_terrains_free(list->rows, list->count);
+    sqlite3_free(list);
+}
+
+static void text(sqlite3_context *result, const char *value) { sqlite3_result_text(result, value, -1, SQLITE_TRANSIENT); }
+
+static void terrains_column(void *data, size_t row, int column, sqlite3_context *result) {
+    const store_terrain *t = &((terrain_list *)data)->rows[row];
+    const double a = rqt_unit_metres(&t->unit, t->min_q), b = rqt_unit_metres(&t->unit, t->max_q);
+    const bool has_heights = t->voids < (int64_t)t->lattice.width * t->lattice.height;
+    switch (column) {
+    case 0: text(result, t->name); break;
+    case 1:
+        if (t->srid) sqlite3_result_int(result, t->srid);
+        break;
+    case 2: sqlite3_result_int(result, t->lattice.width); break;
+    case 3: sqlite3_result_int(result, t->lattice.height); break;
+    case 4: sqlite3_result_double(result, fabs(t->placement.dx)); break;
+    case 5: sqlite3_result_double(result, fabs(t->placement.dy)); break;
+    case 6:
+        if (has_heights) sqlite3_result_double(result, a < b ? a : b);
+        break;
+    case 7:
+        if (has_heights) sqlite3_result_double(result, a < b ? b : a);
+        break;
+    case 8: sqlite3_result_double(result, fabs(rqt_unit_factor(&t->unit)) / (double)t->unit.d); break;
+    case 9: sqlite3_result_int64(result, t->voids); break;
+    case 10: sqlite3_result_int64(result, t->blocks); break;
+    case 11: sqlite3_result_int64(result, t->bytes); break;
+    case 12: sqlite3_result_double(result, rqt_code_metres(t->max_error)); break;
+    case 13: text(result, t->schema); break;
+    case 14: sqlite3_result_int(result, t->complete); break;
+    case 15: sqlite3_result_double(result, t->placement.x0); break;
+    case 16: sqlite3_result_double(result, t->placement.y0); break;
+    case 17: sqlite3_result_double(result, t->placement.dx); break;
+    case 18: sqlite3_result_double(result, t->placement.dy); break;
+    case 19: sqlite3_result_int(result, t->k); break;
+    case 20: sqlite3_result_double(result, t->quantum_error); break;
+    case 21: text(result, t->crs); break;
+    case 22: text(result, t->vertical); break;
+    case 23: text(result, t->source); break;
+    default: text(result, t->created); break;
+    }
+}
+
+int fill_terrains(connection *c, sqlite3_value **arguments, row_set *rows, char **error) {
+    (void)arguments;
+    store *s;
+    int code = connection_store(c, &s, error);
+    terrain_list *list = sqlite3_malloc(sizeof *list);
+    if (code == SQLITE_OK && !list) code = SQLITE_NOMEM;
+    if (code == SQLITE_OK) code = store_terrains(s, &list->rows, &list->count, error);
+    if (code != SQLITE_OK) {
+        sqlite3_free(list);
+        return code;
+    }
+    *rows = (row_set){(size_t)list->count, list, terrains_column, release_terrains};
+    return SQLITE_OK;
+}
+
+/* ------------------------------------------------------------------------------------------ rqt_explain */
+typedef struct explanation {
+    store_reads reads;
+    rqt_lattice lattice;
+    int k;
+    rqt_placement placement;
+} explanation;
+
+static void release_explanation(void *data) {
+    store_reads_free(&((explanation *)data)->reads);
+    sqlite3_free(data);
+}
+
+static void explain_column(void *data, size_t row, int column, sqlite3_context *result) {
+    const explanation *e = data;
+    const store_read *read = &e->reads.rows[row];
+    rqt_block_place p;
+    if (rqt_block_locate(&e->lattice, e->k, read->number, &p) != RQT_OK) return;
+    switch (column) {
+    case 0: sqlite3_result_int(result, p.level); break;
+    case 1: {
+        const rqt_vertex far_corner = rqt_vertex_clamp(&e->lattice, (rqt_vertex){p.x + p.side, p.y + p.side});
+        const rqt_placement *at = &e->placement;
+        char x0[32], y0[32], x1[32], y1[32];
+        (void)format_double(at->x0 + p.x * at->dx, x0);
+        (void)format_double(at->x0 + far_corner.x * at->dx, x1);
+        (void)format_double(at->y0 + far_corner.y * at->dy, y0);
+        (void)format_double(at->y0 + p.y * at->dy, y1);
+        char *wkt = sqlite3_mprintf("POLYGON((%s %s, %s %s, %s %s, %s %s, %s %s))", x0, y0, x1, y0, x1, y1, x0, y1, x0, y0);
+        if (wkt)
+            sqlite3_result_text(result, wkt, -1, sqlite3_free);
+        else
+            sqlite3_result_error_nomem(result);
+        break;
+    }
+    case 2:
+        text(result, read->needs_bytes ? "answers eps; its centre is selected, so its bytes are walked"
+                                       : "answers eps; nothing is selected inside, so its index row is enough");
+        break;
+    case 3: sqlite3_result_int64(result, read->bytes); break;
+    case 4: sqlite3_result_int(result, read->cached); break;
+    case 5: sqlite3_result_int64(result, read->selected); break;
+    default: sqlite3_result_int64(result, (sqlite3_int64)read->number); break;
+    }
+}
+
+int fill_explain(connection *c, sqlite3_value **arguments, row_set *rows, char **error) {
+    request r;
+    int code = request_read(c, arguments[0], arguments[1], arguments[2], arguments[3], &r, error);
+    if (code != SQLITE_OK) return code;
+    explanation *e = sqlite3_malloc(sizeof *e);
+    code = e ? SQLITE_OK : SQLITE_NOMEM;
+    rqt_patch patch = {0};
+    if (e) {
+        *e = (explanation){.lattice = r.terrain->lattice, .k = r.terrain->k, .placement = r.terrain->placement};
+        code = request_patch(&r, &patch, &e->reads, error);
+    }
+    rqt_patch_free(&patch);
+    request_free(&r);
+    if (code != SQLITE_OK) {
+        sqlite3_free(e);
+        return code;
+    }
+    *rows = (row_set){e->reads.count, e, explain_column, release_explanation};
+    return SQLITE_OK;
+}
+
+/* -------------------------------------------------------------------------------------------- rqt_check */
+typedef struct finding {
+    char *severity, *message;
+    rqt_block_number block;
+} finding;
+typedef struct finding_list {
+    finding *rows;
+    size_t count;
+    bool out_of_memory;
+} finding_list;
+
+#define MOST_FINDINGS 10000 /* a thoroughly broken terrain need not fill the memory */
+
+static void release_findings(void *data) {
+    finding_list *list = data;
+    for (size_t i = 0; i < list->count; i++) {
+        sqlite3_free(list->rows[i].severity);
+        sqlite3_free(list->rows[i].message);
+    }
+    sqlite3_free(list->rows);
+    sqlite3_free(list);
+}
+
+static bool add_finding(void *context, const store_finding *found) {
+    finding_list *list = context;
+    finding *rows = sqlite3_realloc64(list->rows, (list->count + 1) * sizeof *rows);
+    if (!rows) {
+        list->out_of_memory = true;
+        return false;
+    }
+    list->rows = rows;
+    rows[list->count++] = (finding){sqlite3_mprintf("%s", found->severity), sqlite3_mprintf("%s", found->message), found->block};
+    return list->count < MOST_FINDINGS;
+}
+
+static void check_column(void *data, size_t row, int column, sqlite3_context *result) {
+    const finding *f = &((finding_list *)data)->rows[row];
+    if (column == 0)
+        text(result, f->severity);
+    else if (column == 2)
+        text(result, f->message);
+    else if (f->block)
+        sqlite3_result_int64(result, (sqlite3_int64)f->block);
+}
+
+/* Every terrain of the name; all of them without one. Incomplete ones too: that is a finding. */
+int fill_check(connection *c, sqlite3_value **arguments, row_set *rows, char **error) {
+    store *s;
+    int code = connection_store(c, &s, error);
+    if (code != SQLITE_OK) return code;
+    terrain_list terrains = {0};
+    finding_list *list = sqlite3_malloc(sizeof *list);
+    if (!list) return SQLITE_NOMEM;
+    memset(list, 0, sizeof *list);
+    const char *name = arguments[0] && sqlite3_value_type(arguments[0]) != SQLITE_NULL
+                           ? (const char *)sqlite3_value_text(arguments[0])
+                           : NULL;
+    code = store_terrains(s, &terrains.rows, &terrains.count, error);
+    int checked = 0;
+    for (int i = 0; i < terrains.count && code == SQLITE_OK; i++) {
+        if (name && strcmp(name, terrains.rows[i].name) != 0) continue;
+        checked++;
+        if (!terrains.rows[i].complete) {
+            char *message = sqlite3_mprintf("terrain %s is incomplete: its import did not finish", terrains.rows[i].name);
+            if (!message || !add_finding(list, &(store_finding){"warning", 0, message})) code = SQLITE_NOMEM;
+            sqlite3_free(message);
+            continue;
+        }
+        char *qualified = sqlite3_mprintf("%s.%s", terrains.rows[i].schema, terrains.rows[i].name);
+        const store_terrain *t;
+        code = qualified ? store_find(s, qualified, &t, error) : SQLITE_NOMEM;
+        sqlite3_free(qualified);
+        if (code == SQLITE_OK) code = store_check(s, t, add_finding, list, error);
+    }
+    if (code == SQLITE_OK && list->out_of_memory) code = SQLITE_NOMEM;
+    if (code == SQLITE_OK && name && checked == 0) {
+        const store_terrain *none;
+        code = store_find(s, name, &none, error); /* says which there are */
+    }
+    store_terrains_free(terrains.rows, terrains.count);
+    if (code != SQLITE_OK) {
+        release_findings(list);
+        return code;
+    }
+    *rows = (row_set){list->count, list, check_column, release_findings};
+    return SQLITE_OK;
+}
+
+/* --------------------------------------------------------------------------------------------- rqt_help */
+static void help_column(void *data, size_t row, int column, sqlite3_context *result) {
+    (void)data;
+    const function *f = &rqt_functions[row];
+    switch (column) {
+    case 0: text(result, f->name); break;
+    case 1: text(result, f->call ? "scalar" : "table"); break;
+    case 2: text(result, f->arguments); break;
+    case 3: text(result, f->returns); break;
+    case 4: text(result, f->purpose); break;
+    default: text(result, f->example); break;
+    }
+}
+
+int fill_help(connection *c, sqlite3_value **arguments, row_set *rows, char **error) {
+    (void)c, (void)arguments, (void)error;
+    *rows = (row_set){(size_t)rqt_function_count, NULL, help_column, NULL};
+    return SQLITE_OK;
+}

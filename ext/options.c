@@ -1,0 +1,67 @@
+/* options.c - the JSON object of options: which keys and values the contract has, and which of them this version does. */
+#include "functions.h"
+
+#include <cjson/cJSON.h>
+#include <string.h>
+
+typedef struct choice {
+    const char *key;
+    const char *done;    /* values that work, between blanks */
+    const char *pending; /* values of the contract that are not in this version; "*": any value */
+} choice;
+
+static const choice choices[] = {
+    {"mode", " cover ", " snap border cut "},
+    {"outline", " exact ", " tol "},
+    {"metric", " exact ", " minimal local wedgie euclid "},
+    {"select", " threshold topdown bottomup ", ""},
+    {"strip", " bintree ", " fan "},
+    {"detail", "", "*"},
+    {"max_vertices", "", "*"},
+    {"max_triangles", "", "*"},
+    {"previous", "", "*"},
+    {"frame", "", "*"},
+    {"test", "", "*"},
+};
+
+static bool holds(const char *words, const char *word) {
+    const size_t n = strlen(word);
+    if (n == 0 || strchr(word, ' ')) return false;
+    for (const char *p = words; (p = strstr(p, word)) != NULL; p += n)
+        if (p[-1] == ' ' && p[n] == ' ') return true;
+    return false;
+}
+
+static int read_one(const cJSON *item, store_query_options *options, char **error) {
+    const choice *c = NULL;
+    for (size_t i = 0; i < sizeof choices / sizeof *choices; i++)
+        if (strcmp(choices[i].key, item->string) == 0) c = &choices[i];
+    if (!c) return fail(error, "unknown option \"%s\"", item->string);
+    if (c->pending[0] == '*') return fail(error, "option \"%s\" is not in this version", c->key);
+    if (!cJSON_IsString(item)) return fail(error, "option \"%s\" must be a text: one of%s%s", c->key, c->done, c->pending);
+    const char *value = item->valuestring;
+    if (holds(c->pending, value)) return fail(error, "option \"%s\":\"%s\" is not in this version", c->key, value);
+    if (!holds(c->done, value))
+        return fail(error, "option \"%s\" has no value \"%s\"; it knows%s%s", c->key, value, c->done,
+                    c->pending[0] ? c->pending + 1 : "");
+    if (strcmp(c->key, "select") == 0)
+        options->select = strcmp(value, "topdown") == 0    ? RQT_SELECT_TOP_DOWN
+                          : strcmp(value, "bottomup") == 0 ? RQT_SELECT_BOTTOM_UP
+                                                           : RQT_SELECT_THRESHOLD;
+    return SQLITE_OK;
+}
+
+int options_read(const char *json, store_query_options *options, char **error) {
+    *options = (store_query_options){RQT_SELECT_THRESHOLD, RQT_OUTLINE_EXACT};
+    const char *end = NULL;
+    cJSON *root = cJSON_ParseWithOpts(json, &end, true);
+    if (!root) return fail(error, "options are not JSON, from here: %.40s", end ? end : json);
+    int code = cJSON_IsObject(root) ? SQLITE_OK : fail(error, "options must be a JSON object");
+    for (const cJSON *item = root->child; item && code == SQLITE_OK; item = item->next) {
+        for (const cJSON *other = item->next; other && code == SQLITE_OK; other = other->next)
+            if (strcmp(item->string, other->string) == 0) code = fail(error, "option \"%s\" is given twice", item->string);
+        if (code == SQLITE_OK) code = read_one(item, options, error);
+    }
+    cJSON_Delete(root);
+    return code;
+}

@@ -1,0 +1,82 @@
+/* request.c - region, eps, terrain and options out of SQL values: one reading of them for every function. */
+#include "functions.h"
+
+#include <math.h>
+#include <string.h>
+
+bool request_number(sqlite3_value *value, const char *what, double *number, char **error) {
+    const int type = value ? sqlite3_value_numeric_type(value) : SQLITE_NULL;
+    *number = 0;
+    if (type == SQLITE_INTEGER || type == SQLITE_FLOAT) {
+        *number = sqlite3_value_double(value);
+        if (!isnan(*number)) return true;
+    }
+    (void)fail(error, "%s must be a number; it is %s", what,
+               type == SQLITE_NULL ? "NULL" : (type == SQLITE_BLOB ? "a BLOB" : "text"));
+    return false;
+}
+
+int request_terrain(store *s, sqlite3_value *name, const store_terrain **terrain, char **error) {
+    const char *text = NULL;
+    if (name && sqlite3_value_type(name) != SQLITE_NULL) {
+        if (sqlite3_value_type(name) != SQLITE_TEXT) return fail(error, "terrain must be a name");
+        text = (const char *)sqlite3_value_text(name);
+        if (!text) return SQLITE_NOMEM;
+    }
+    return store_find(s, text, terrain, error);
+}
+
+static int read_region(request *r, sqlite3_value *value, char **error) {
+    const int type = value ? sqlite3_value_type(value) : SQLITE_NULL;
+    if (type == SQLITE_INTEGER || type == SQLITE_FLOAT)
+        return fail(error, "region must be WKT text, a geometry or NULL; it is a number");
+    if (type != SQLITE_NULL) {
+        const void *bytes = type == SQLITE_TEXT ? (const void *)sqlite3_value_text(value) : sqlite3_value_blob(value);
+        const size_t n = (size_t)sqlite3_value_bytes(value);
+        if (!bytes && n > 0) return SQLITE_NOMEM;
+        rqt_message why = {""};
+        const rqt_status status =
+            rqt_geometry_parse(bytes ? bytes : "", n, type == SQLITE_TEXT, store_allocator(), &r->geometry, &why);
+        if (status == RQT_NO_MEMORY) return SQLITE_NOMEM;
+        if (status != RQT_OK) return fail(error, "region: %s", why.text);
+        const int32_t srid = rqt_geometry_srid(r->geometry);
+        const store_terrain *t = r->terrain;
+        if (srid != 0 && srid != t->srid && !(srid == 4326 && t->wgs84))
+            return fail(error,
+                        "region has SRID %d, terrain %s has SRID %d; transforming between them is not in this version",
+                        srid, t->name, t->srid);
+    }
+    const rqt_status status =
+        rqt_region_create(r->geometry, &r->terrain->placement, &r->terrain->lattice, store_allocator(), &r->region);
+    if (status == RQT_OK) return SQLITE_OK;
+    return status == RQT_NO_MEMORY ? SQLITE_NOMEM : fail(error, "region cannot be placed on terrain %s", r->terrain->name);
+}
+
+int request_read(connection *c, sqlite3_value *region, sqlite3_value *eps, sqlite3_value *terrain,
+                 sqlite3_value *options, request *r, char **error) {
+    memset(r, 0, sizeof *r);
+    if (!request_number(eps, "eps", &r->eps, error)) return *error ? SQLITE_ERROR : SQLITE_NOMEM;
+    if (r->eps < 0) return fail(error, "eps must be 0 or more; it is %!.15g", r->eps);
+    r->options = (store_query_options){RQT_SELECT_THRESHOLD, RQT_OUTLINE_EXACT};
+    int code = SQLITE_OK;
+    if (options && sqlite3_value_type(options) != SQLITE_NULL) {
+        const char *json = (const char *)sqlite3_value_text(options);
+        code = json ? options_read(json, &r->options, error) : SQLITE_NOMEM;
+    }
+    if (code == SQLITE_OK) code = connection_store(c, &r->store, error);
+    if (code == SQLITE_OK) code = request_terrain(r->store, terrain, &r->terrain, error);
+    if (code == SQLITE_OK) code = read_region(r, region, error);
+    if (code != SQLITE_OK) request_free(r);
+    return code;
+}
+
+int request_patch(request *r, rqt_patch *patch, store_reads *reads, char **error) {
+    return store_query(r->store, r->terrain, r->region, r->eps, &r->options, patch, reads, error);
+}
+
+void request_free(request *r) {
+    rqt_region_free(r->region);
+    rqt_geometry_free(r->geometry);
+    r->region = NULL;
+    r->geometry = NULL;
+}

@@ -1,0 +1,203 @@
+/* scalar.c - the functions that give one value. */
+#include "functions.h"
+
+#include "format.h"
+#include "geo.h"
+
+#include <math.h>
+#include <string.h>
+#include <zstd.h>
+
+void scalar_error(sqlite3_context *result, const char *name, int code, char *sentence) {
+    if (code == SQLITE_NOMEM || !sentence) {
+        if (code == SQLITE_NOMEM)
+            sqlite3_result_error_nomem(result);
+        else
+            sqlite3_result_error_code(result, code);
+    } else {
+        char *whole = sqlite3_mprintf("%s(): %s", name, sentence);
+        if (whole) {
+            sqlite3_result_error(result, whole, -1);
+            sqlite3_result_error_code(result, code);
+        } else {
+            sqlite3_result_error_nomem(result);
+        }
+        sqlite3_free(whole);
+    }
+    sqlite3_free(sentence);
+}
+
+void call_version(sqlite3_context *result, int count, sqlite3_value **arguments) {
+    (void)count, (void)arguments;
+    sqlite3_result_text(result, RQT_VERSION, -1, SQLITE_STATIC);
+}
+
+void call_build_info(sqlite3_context *result, int count, sqlite3_value **arguments) {
+    (void)count, (void)arguments;
+    char *info = sqlite3_mprintf("rqt %s, format %d, built with %s, SQLite %s (running %s), GeographicLib %s, zstd %s", RQT_VERSION,
+                                 RQT_FORMAT_VERSION,
+#ifdef __clang__
+                                 "clang " __clang_version__,
+#else
+                                 "gcc " __VERSION__,
+#endif
+                                 SQLITE_VERSION, sqlite3_libversion(), geo_version(), ZSTD_versionString());
+    if (info)
+        sqlite3_result_text(result, info, -1, sqlite3_free);
+    else
+        sqlite3_result_error_nomem(result);
+}
+
+static void result_ring(sqlite3_context *result, const double *xy, int n, int32_t srid) {
+    uint8_t *bytes = NULL;
+    size_t size = 0;
+    if (format_ring_gpkg(xy, n, srid, store_allocator(), &bytes, &size) == RQT_OK)
+        sqlite3_result_blob64(result, bytes, size, sqlite3_free);
+    else
+        sqlite3_result_error_nomem(result);
+}
+
+void call_bbox(sqlite3_context *result, int count, sqlite3_value **arguments) {
+    static const char *const names[] = {"x0", "y0", "x1", "y1", "srid"};
+    double v[5] = {0};
+    char *error = NULL;
+    for (int i = 0; i < count; i++) {
+        if (i == 4 && sqlite3_value_type(arguments[4]) == SQLITE_NULL) continue;
+        if (!request_number(arguments[i], names[i], &v[i], &error) || !isfinite(v[i])) {
+            if (!error) (void)fail(&error, "%s must be finite", names[i]);
+            scalar_error(result, "rqt_bbox", SQLITE_ERROR, error);
+            return;
+        }
+    }
+    if (v[0] > v[2] || v[1] > v[3])
+        (void)fail(&error, "%s is greater than %s: give the lesser corner first", v[0] > v[2] ? "x0" : "y0",
+                   v[0] > v[2] ? "x1" : "y1");
+    else if (v[4] != floor(v[4]) || fabs(v[4]) > INT32_MAX)
+        (void)fail(&error, "srid must be an integer");
+    if (error) {
+        scalar_error(result, "rqt_bbox", SQLITE_ERROR, error);
+        return;
+    }
+    const double ring[8] = {v[0], v[1], v[2], v[1], v[2], v[3], v[0], v[3]};
+    result_ring(result, ring, 4, (int32_t)v[4]);
+}
+
+#define CIRCLE_POINTS 256 /* the polygon's sides sag by 0.0075 % of the radius */
+
+void call_circle(sqlite3_context *result, int count, sqlite3_value **arguments) {
+    static const char *const names[] = {"lon", "lat", "metres"};
+    double v[3];
+    char *error = NULL;
+    for (int i = 0; i < count; i++)
+        if (!request_number(arguments[i], names[i], &v[i], &error)) {
+            scalar_error(result, "rqt_circle", SQLITE_ERROR, error);
+            return;
+        }
+    double ring[2 * CIRCLE_POINTS];
+    char why[256] = "";
+    if (geo_circle(v[0], v[1], v[2], CIRCLE_POINTS, ring, why, sizeof why) == 0) {
+        result_ring(result, ring, CIRCLE_POINTS, 4326);
+        return;
+    }
+    const int code = fail(&error, "%s", why);
+    scalar_error(result, "rqt_circle", code, error);
+}
+
+/* -------------------------------------------------------------------------------------------- rqt_mesh */
+
+static int own_format(const request *r, const rqt_patch *patch, rqt_mesh_kind kind, uint8_t **bytes, size_t *size,
+                      char **error) {
+    uint32_t *strip = NULL;
+    size_t indices = 3 * patch->triangle_count;
+    if (kind == RQT_MESH_STRIP && rqt_strip_build(patch, store_allocator(), &strip, &indices) != RQT_OK)
+        return SQLITE_NOMEM;
+    const rqt_mesh_header header = {.kind = kind,
+                                    .vertex_count = patch->vertex_count,
+                                    .index_count = indices,
+                                    .placement = r->terrain->placement,
+                                    .unit = r->terrain->unit,
+                                    .eps = r->eps,
+                                    .srid = r->terrain->srid};
+    *size = rqt_mesh_bytes(&header);
+    int code = SQLITE_OK;
+    if (*size > INT32_MAX)
+        code = fail(error, "the mesh is larger than 2 GiB; ask for less or a larger eps");
+    else
+        *bytes = sqlite3_malloc64(*size);
+    if (code == SQLITE_OK && !*bytes) code = SQLITE_NOMEM;
+    if (code == SQLITE_OK)
+        rqt_mesh_encode(&header, patch->vertices, kind == RQT_MESH_STRIP ? strip : patch->triangles, *bytes);
+    sqlite3_free(strip);
+    return code;
+}
+
+static int other_format(const request *r, const rqt_patch *patch, format_kind kind, uint8_t **bytes, size_t *size,
+                        char **error) {
+    const format_frame frame = {.placement = r->terrain->placement,
+                                .unit = r->terrain->unit,
+                                .srid = r->terrain->srid,
+                                .title = r->terrain->name,
+                                .eps = r->eps};
+    const rqt_status status = format_patch(patch, &frame, kind, store_allocator(), bytes, size);
+    if (status == RQT_OK) return SQLITE_OK;
+    if (status == RQT_NO_MEMORY) return SQLITE_NOMEM;
+    return fail(error, "the mesh is larger than 2 GiB in this format; ask for less or a larger eps");
+}
+
+void call_mesh(sqlite3_context *result, int count, sqlite3_value **arguments) {
+    connection *c = sqlite3_user_data(result);
+    char *error = NULL;
+    request r = {0};
+    rqt_patch patch = {0};
+    uint8_t *bytes = NULL;
+    size_t size = 0;
+    format_kind kind = FORMAT_OBJ;
+    const char *format = sqlite3_value_type(arguments[2]) == SQLITE_TEXT ? (const char *)sqlite3_value_text(arguments[2]) : "";
+    const bool strip = strcmp(format, "strip") == 0, indexed = strcmp(format, "indexed") == 0;
+    const bool other = !strip && !indexed && format_from_name(format, &kind);
+    int code = SQLITE_OK;
+    if (strcmp(format, "rqt") == 0 || strcmp(format, "glb") == 0)
+        code = fail(&error, "format \"%s\" is not in this version", format);
+    else if (!strip && !indexed && !other)
+        code = fail(&error, "unknown format \"%s\"; there are strip indexed obj ply wkb gpkg spatialite", format);
+    if (code == SQLITE_OK)
+        code = request_read(c, arguments[0], arguments[1], count > 3 ? arguments[3] : NULL, count > 4 ? arguments[4] : NULL,
+                            &r, &error);
+    if (code == SQLITE_OK) code = request_patch(&r, &patch, NULL, &error);
+    if (code == SQLITE_OK)
+        code = other ? other_format(&r, &patch, kind, &bytes, &size, &error)
+                     : own_format(&r, &patch, strip ? RQT_MESH_STRIP : RQT_MESH_INDEXED, &bytes, &size, &error);
+    rqt_patch_free(&patch);
+    request_free(&r);
+    connection_done(c);
+    if (code != SQLITE_OK)
+        scalar_error(result, "rqt_mesh", code, error);
+    else if (kind == FORMAT_OBJ && other)
+        sqlite3_result_text64(result, (const char *)bytes, size, sqlite3_free, SQLITE_UTF8);
+    else
+        sqlite3_result_blob64(result, bytes, size, sqlite3_free);
+}
+
+void call_height(sqlite3_context *result, int count, sqlite3_value **arguments) {
+    connection *c = sqlite3_user_data(result);
+    char *error = NULL;
+    double x, y, eps = -1, metres = 0;
+    bool found = false;
+    store *s;
+    const store_terrain *t;
+    int code = SQLITE_OK;
+    if (!request_number(arguments[0], "x", &x, &error) || !request_number(arguments[1], "y", &y, &error))
+        code = SQLITE_ERROR;
+    else if (count > 2 && !request_number(arguments[2], "eps", &eps, &error))
+        code = SQLITE_ERROR;
+    else if (count > 2 && eps < 0)
+        code = fail(&error, "eps must be 0 or more");
+    if (code == SQLITE_OK) code = connection_store(c, &s, &error);
+    if (code == SQLITE_OK) code = request_terrain(s, count > 3 ? arguments[3] : NULL, &t, &error);
+    if (code == SQLITE_OK) code = store_height(s, t, x, y, eps, &metres, &found, &error);
+    connection_done(c);
+    if (code != SQLITE_OK)
+        scalar_error(result, "rqt_height", code, error);
+    else if (found)
+        sqlite3_result_double(result, metres);
+}
