@@ -158,6 +158,14 @@ static void errors_past_the_last_sample_are_exact(void **state) {
                     raster_make(s ? SURFACE_EXTREMES : SURFACE_HILLS, sides[n][0], sides[n][1], voids));
 }
 
+static void errors_of_long_and_narrow_rasters_are_exact(void **state) {
+    (void)state;
+    random_begin("narrow");
+    /* the widest triangles that the oracle can take: clamped ones have the square of their width as denominator */
+    check_errors_equal_oracle(raster_make(SURFACE_EXTREMES, 270, 4, -1));
+    check_errors_equal_oracle(raster_make(SURFACE_HILLS, 3, 200, 0));
+}
+
 static void a_plane_has_no_error_anywhere(void **state) {
     (void)state;
     random_begin("plane");
@@ -388,6 +396,7 @@ int main(void) {
         TEST(errors_equal_the_oracles_on_adversarial_surfaces),
         TEST(errors_equal_the_oracles_in_feet_and_in_thousandths),
         TEST(errors_past_the_last_sample_are_exact),
+        TEST(errors_of_long_and_narrow_rasters_are_exact),
         TEST(a_plane_has_no_error_anywhere),
         TEST(values_at_voids_do_not_matter),
         TEST(errors_can_be_stopped_and_leave_nothing),

@@ -545,10 +545,10 @@ static void parts_of_a_split_window_make_exactly_the_whole(void **state) {
             key *keys = calloc(2 * room, sizeof *keys);
             if (!keys) abort();
             for (int part = 0; part < 5; part++) { /* four quarters, then the whole */
-                int i = part & 1, j = part >> 1;
-                const long rectangle[4] = {across[i], down[j], across[i + 1], down[j + 1]};
-                if (part < 4 && (rectangle[0] >= rectangle[2] || rectangle[1] >= rectangle[3])) continue;
-                window one = window_of(part < 4 ? rectangle : whole);
+                int i = part & 1, j = part >> 1 & 1;
+                const long quarter[4] = {across[i], down[j], across[i + 1], down[j + 1]};
+                if (part < 4 && (quarter[0] >= quarter[2] || quarter[1] >= quarter[3])) continue;
+                window one = window_of(part < 4 ? quarter : whole);
                 rqt_region *region = region_of(&one, &m.grid.lattice);
                 rqt_patch patch;
                 assert_int_equal(

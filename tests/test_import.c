@@ -13,6 +13,7 @@
 #include <string.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 #include <cmocka.h>
 
@@ -1152,6 +1153,70 @@ static void a_stopped_import_leaves_the_database_as_it_was(void **unused) {
     }
 }
 
+/* Die, as by kill -9, at the n-th call of a stage. */
+static bool die_at(void *context, const char *stage, double done, int64_t samples) {
+    stopper *s = context;
+    (void)done;
+    (void)samples;
+    if (!strcmp(stage, s->stage) && ++s->seen == s->calls) raise(SIGKILL);
+    return true;
+}
+
+static void a_killed_import_leaves_no_terrain_that_looks_whole(void **unused) {
+    (void)unused;
+    static const stopper moments[] = {{.stage = "reading", .calls = 1},
+                                      {.stage = "errors", .calls = 1},
+                                      {.stage = "blocks", .calls = 1},
+                                      {.stage = "blocks", .calls = 5},
+                                      {.stage = "blocks", .calls = 20}};
+    static double values[140 * 120];
+    fill(values, 140, 120, 1);
+    raster r = {.name = "a.tif", .width = 140, .height = 120, .type = GDT_Int16};
+    write_raster(&r, values);
+    small_raster("old.tif", 5);
+    import_options o = defaults();
+    o.k = 2;
+    o.notice = NULL;
+    for (size_t i = 0; i < LENGTH(moments); i++) {
+        for (int old = 0; old < 2; old++) {
+            const char *database = file("b.gpkg");
+            VSIUnlink(database);
+            if (old) import_fine(file("old.tif"), database, &o);
+            pid_t child = fork();
+            if (child == 0) {
+                stopper s = moments[i];
+                const char *source = file("a.tif");
+                import_options with = o;
+                with.progress = die_at;
+                with.context = &s;
+                import_many(&source, 1, database, &with);
+                _exit(0);
+            }
+            int status;
+            assert_int_equal(waitpid(child, &status, 0), child);
+            assert_true(WIFSIGNALED(status));
+            if (old) {
+                char *names =
+                    dump(database, "SELECT count(*), sum(complete), count(*) FROM rqt_terrain WHERE name = 'old'");
+                char *all = dump(database, "SELECT count(*), sum(complete), count(*) FROM rqt_terrain");
+                assert_string_equal(names, "31 31 31 \n");
+                assert_string_equal(all, names);
+                sqlite3_free(names);
+                sqlite3_free(all);
+            } else if (exists(database)) {
+                char *tables = dump(database, "SELECT count(*) FROM sqlite_schema");
+                assert_string_equal(tables, "30 \n");
+                sqlite3_free(tables);
+            }
+            /* And nothing stands in the way of the next one. */
+            import_fine(file("a.tif"), database, &o);
+            terrain t = open_terrain(database, "a");
+            expect_metres(&t, values);
+            close_terrain(&t);
+        }
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
 #define TEST(name) cmocka_unit_test_setup(name, begin)
@@ -1185,6 +1250,7 @@ int main(void) {
         TEST(databases_that_cannot_be_written_get_a_sentence),
         TEST(a_full_disk_leaves_nothing),
         TEST(a_stopped_import_leaves_the_database_as_it_was),
+        TEST(a_killed_import_leaves_no_terrain_that_looks_whole),
     };
     return cmocka_run_group_tests(tests, begin_all, end_all);
 }

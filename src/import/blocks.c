@@ -84,7 +84,7 @@ static void *encode(void *context) {
 }
 
 /* The slots in order, as they fill. */
-static bool write_all(const import_job *job, ring *r, store_writer *writer, const char *database, int64_t samples,
+static bool write_all(const import_job *job, ring *r, store_writer *writer, int64_t samples,
                       import_report *report) {
     for (size_t n = 0; n < r->count; n++) {
         slot *s = &r->slots[n % r->length];
@@ -98,7 +98,7 @@ static bool write_all(const import_job *job, ring *r, store_writer *writer, cons
                                  (int)failed);
         char *detail = NULL;
         int code = store_writer_block(writer, s->number, &s->summary, s->bytes, s->size, &detail);
-        if (code != SQLITE_OK) return import_database_refuse(job, database, code, detail);
+        if (code != SQLITE_OK) return import_database_refuse(job, code, detail);
         report->blocks++;
         report->bytes += (int64_t)s->size + RQT_SUMMARY_BYTES;
         pthread_mutex_lock(&r->lock);
@@ -129,7 +129,7 @@ static void ring_free(ring *r) {
 }
 
 bool import_blocks(const import_job *job, const rqt_pyramid *pyramid, int k, double quantum, store_writer *writer,
-                   const char *database, int64_t samples, import_report *report) {
+                   int64_t samples, import_report *report) {
     int jobs = job->options->jobs;
     ring r = {.pyramid = pyramid, .k = k, .quantum = quantum, .count = rqt_pyramid_count(pyramid)};
     pthread_t *threads = calloc((size_t)jobs, sizeof *threads);
@@ -143,7 +143,7 @@ bool import_blocks(const import_job *job, const rqt_pyramid *pyramid, int k, dou
         int started = 0;
         while (started < jobs && pthread_create(&threads[started], NULL, encode, &r) == 0) started++;
         if (started > 0)
-            ok = write_all(job, &r, writer, database, samples, report);
+            ok = write_all(job, &r, writer, samples, report);
         else
             import_refuse(job, "no thread could be started to encode blocks");
         pthread_mutex_lock(&r.lock);

@@ -19,8 +19,8 @@
 #define BUSY_MILLISECONDS 3000
 #define CACHE_KIBIBYTES 32768
 
-bool import_database_refuse(const import_job *job, const char *path, int code, char *detail) {
-    const char *more = detail && *detail ? detail : sqlite3_errstr(code);
+bool import_database_refuse(const import_job *job, int code, char *detail) {
+    const char *path = job->database, *more = detail && *detail ? detail : sqlite3_errstr(code);
     switch (code & 0xFF) {
     case SQLITE_BUSY:
     case SQLITE_LOCKED:
@@ -52,7 +52,7 @@ bool import_database_refuse(const import_job *job, const char *path, int code, c
 static bool run(const import_job *job, const import_database *d, const char *sql) {
     char *detail = NULL;
     int code = sqlite3_exec(d->db, sql, NULL, NULL, &detail);
-    return code == SQLITE_OK || import_database_refuse(job, d->path, sqlite3_extended_errcode(d->db), detail);
+    return code == SQLITE_OK || import_database_refuse(job, sqlite3_extended_errcode(d->db), detail);
 }
 
 static bool is_wal(sqlite3 *db) {
@@ -66,20 +66,20 @@ static bool is_wal(sqlite3 *db) {
 
 static bool open_file(const import_job *job, import_database *d, bool create) {
     int flags = SQLITE_OPEN_READWRITE | (create ? SQLITE_OPEN_CREATE : 0);
-    int code = sqlite3_open_v2(d->path, &d->db, flags, NULL);
+    int code = sqlite3_open_v2(job->database, &d->db, flags, NULL);
     if (code != SQLITE_OK) {
         char *detail = d->db ? sqlite3_mprintf("%s", sqlite3_errmsg(d->db)) : NULL;
-        return import_database_refuse(job, d->path, code, detail);
+        return import_database_refuse(job, code, detail);
     }
     sqlite3_extended_result_codes(d->db, 1);
     sqlite3_busy_timeout(d->db, BUSY_MILLISECONDS);
-    if (sqlite3_db_readonly(d->db, "main") == 1) return import_refuse(job, "%s is read-only", d->path);
+    if (sqlite3_db_readonly(d->db, "main") == 1) return import_refuse(job, "%s is read-only", job->database);
     return true;
 }
 
 /* A place where a file can be created. */
-static bool probe_folder(const import_job *job, const char *path) {
-    const char *slash = strrchr(path, '/');
+static bool probe_folder(const import_job *job) {
+    const char *path = job->database, *slash = strrchr(path, '/');
     size_t length = slash ? (size_t)(slash - path) : 0;
     char *folder = length ? strndup(path, length) : strdup(slash ? "/" : ".");
     if (!folder) return import_no_memory(job, "opening the database");
@@ -89,49 +89,53 @@ static bool probe_folder(const import_job *job, const char *path) {
     return ok;
 }
 
-static bool probe_terrain(const import_job *job, sqlite3 *db, const char *path, const char *terrain) {
+static bool probe_terrain(const import_job *job, sqlite3 *db, const char *terrain) {
     store *s = NULL;
     store_terrain *terrains = NULL;
     int count = 0;
     char *detail = NULL;
     int code = store_open(db, &s);
     if (code == SQLITE_OK) code = store_terrains(s, &terrains, &count, &detail);
-    bool ok = code == SQLITE_OK || import_database_refuse(job, path, code, detail);
+    bool ok = code == SQLITE_OK || import_database_refuse(job, code, detail);
     for (int i = 0; ok && i < count; i++)
         if (!strcmp(terrains[i].schema, "main") && !strcmp(terrains[i].name, terrain))
             ok = import_refuse(job,
                                "%s has a terrain '%s' already: --replace replaces it, --name gives another name",
-                               path, terrain);
+                               job->database, terrain);
     if (code == SQLITE_OK) store_terrains_free(terrains, count);
     if (s) store_close(s);
     return ok;
 }
 
-bool import_database_probe(const import_job *job, const char *path, const char *terrain) {
-    import_database d = {.path = path};
+bool import_database_probe(const import_job *job, const char *terrain) {
+    const char *path = job->database;
+    import_database d = {0};
     struct stat file;
     if (!*path || !strcmp(path, ":memory:"))
         return import_refuse(job, "'%s' is not the name of a file: an import goes into a database file", path);
     if (stat(path, &file))
-        return errno == ENOENT ? probe_folder(job, path) : import_refuse(job, "%s: %s", path, strerror(errno));
+        return errno == ENOENT ? probe_folder(job) : import_refuse(job, "%s: %s", path, strerror(errno));
     if (S_ISDIR(file.st_mode)) return import_refuse(job, "%s is a folder and not a database", path);
     /* BEGIN IMMEDIATE finds out about locks; the look at the schema, about files that are something else. */
     bool ok = open_file(job, &d, false) && run(job, &d, "SELECT count(*) FROM sqlite_master; BEGIN IMMEDIATE");
-    if (ok && !job->options->replace) ok = probe_terrain(job, d.db, path, terrain);
+    if (ok && !job->options->replace) ok = probe_terrain(job, d.db, terrain);
     if (d.db && !sqlite3_get_autocommit(d.db)) sqlite3_exec(d.db, "ROLLBACK", NULL, NULL, NULL);
     sqlite3_close(d.db);
     return ok;
 }
 
-/* Bytes of a page in a new file, for what blocks of this k weigh. Up to 65^2 samples that is 1 to 5 KB: several share a
- * large page, where most of a small one would stay empty (a file of 4097^2 samples: 13.8 MB, not 15.5). 129^2 are about 10
- * KB, which fill small pages best (11.6 MB, not 14.1). 257^2 are 40 KB and more: fewer links between pages, same size. */
-static int page_bytes(int k) { return k == 7 ? 4096 : 16384; }
+/* Bytes of a page in a new file, for what blocks of this k weigh. Up to 65^2 samples that is 1 to 5 KB: several
+ * share a large page, where most of a small one would stay empty (a file of 4097^2 samples: 13.8 MB, not 15.5).
+ * 129^2 are about 10 KB, which fill small pages best (11.6 MB, not 14.1). 257^2 are 40 KB and more: fewer links
+ * between pages, same size. */
+static int page_bytes(int k) {
+    return k == 7 ? 4096 : 16384;
+}
 
-bool import_database_begin(const import_job *job, const char *path, int k, import_database *d) {
+bool import_database_begin(const import_job *job, int k, import_database *d) {
     struct stat file;
-    bool there = stat(path, &file) == 0;
-    *d = (import_database){.path = path, .created = !there};
+    bool there = stat(job->database, &file) == 0;
+    *d = (import_database){.created = !there};
     if (!open_file(job, d, true)) return false;
     char sql[200];
     snprintf(sql, sizeof sql, "PRAGMA cache_size = -%d; PRAGMA synchronous = NORMAL", CACHE_KIBIBYTES);
@@ -141,14 +145,15 @@ bool import_database_begin(const import_job *job, const char *path, int k, impor
         snprintf(page_size, sizeof page_size, "PRAGMA page_size = %d", page_bytes(k));
         if (!run(job, d, page_size)) return false;
     } else if (!is_wal(d->db)) {
-        /* Fails, harmlessly, while others have the database open. */
+        /* Fails, harmlessly, while somebody is reading. (Who has the database open at the end keeps it in WAL
+         * mode.) */
         sqlite3_exec(d->db, "PRAGMA journal_mode = WAL", NULL, NULL, NULL);
         d->made_wal = is_wal(d->db);
     }
     if (!run(job, d, "BEGIN IMMEDIATE")) return false;
     char *detail = NULL;
     int code = store_make_geopackage(d->db, &detail);
-    return code == SQLITE_OK || import_database_refuse(job, path, code, detail);
+    return code == SQLITE_OK || import_database_refuse(job, code, detail);
 }
 
 bool import_database_commit(const import_job *job, import_database *d) {
@@ -157,7 +162,7 @@ bool import_database_commit(const import_job *job, import_database *d) {
     return true;
 }
 
-void import_database_close(import_database *d) {
+void import_database_close(const import_job *job, import_database *d) {
     if (d->db) {
         if (!sqlite3_get_autocommit(d->db)) sqlite3_exec(d->db, "ROLLBACK", NULL, NULL, NULL);
         if (d->made_wal) {
@@ -169,7 +174,7 @@ void import_database_close(import_database *d) {
     if (d->created) {
         static const char *const parts[] = {"", "-journal", "-wal", "-shm"};
         for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
-            char *name = sqlite3_mprintf("%s%s", d->path, parts[i]);
+            char *name = sqlite3_mprintf("%s%s", job->database, parts[i]);
             if (name) unlink(name);
             sqlite3_free(name);
         }

@@ -118,11 +118,10 @@ static void name_of(const import_options *o, const import_source *first, char na
 }
 
 /* ------------------------------------------------------------------------------------------------ the whole -- */
-typedef struct import {
+typedef struct import_work {
     import_job job;
     import_source *sources;
     int count, described;
-    const char *path;
     import_mosaic mosaic;
     import_crs crs;
     int k;
@@ -133,7 +132,7 @@ typedef struct import {
     rqt_errors errors;
     import_database database;
     import_report *report;
-} import;
+} import_work;
 
 static double now(void) {
     struct timespec t;
@@ -141,12 +140,12 @@ static double now(void) {
     return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
 }
 
-static int64_t sample_count(const import *m) {
+static int64_t sample_count(const import_work *m) {
     return (int64_t)m->mosaic.lattice.width * m->mosaic.lattice.height;
 }
 
 /* The most memory that any moment of the import takes. */
-static bool check_memory(const import *m) {
+static bool check_memory(const import_work *m) {
     double n = (double)sample_count(m), blocks = n / (double)(1 << 2 * m->k) * 2 + 64;
     double reading = n * (double)import_kind_bytes(m->mosaic.kind) + n +
                      (double)import_read_bytes(m->sources, m->count) + (double)GDAL_CACHE_BYTES;
@@ -159,15 +158,12 @@ static bool check_memory(const import *m) {
                          floor((double)m->job.options->memory / MIB));
 }
 
-static bool describe(import *m, const char *const *paths) {
+static bool describe(import_work *m, const char *const *paths) {
     m->sources = calloc((size_t)m->count, sizeof *m->sources);
     if (!m->sources) return import_no_memory(&m->job, "describing the sources");
     for (int i = 0; i < m->count; i++) {
         m->described = i + 1;
         if (!import_source_describe(&m->job, paths[i], &m->sources[i])) return false;
-        if (import_source_is_file(&m->sources[i], m->path))
-            return import_refuse(&m->job, "%s is part of the source %s and cannot be the database too", m->path,
-                                 paths[i]);
     }
     if (!import_mosaic_plan(&m->job, m->sources, m->count, &m->mosaic)) return false;
     if (!import_crs_describe(m->sources[0].crs, &m->crs)) return import_no_memory(&m->job, "describing the CRS");
@@ -177,7 +173,7 @@ static bool describe(import *m, const char *const *paths) {
     return check_memory(m);
 }
 
-static void tell_extreme(const import *m, double value, int64_t times) {
+static void tell_extreme(const import_work *m, double value, int64_t times) {
     const rqt_unit unit = import_source_unit(&m->sources[0]);
     double raw = m->mosaic.is_metres ? (value - unit.offset) / rqt_unit_factor(&unit) : value;
     import_notice(
@@ -187,7 +183,7 @@ static void tell_extreme(const import *m, double value, int64_t times) {
         (long long)times, raw, raw);
 }
 
-static bool read_heights(import *m) {
+static bool read_heights(import_work *m) {
     import_report *report = m->report;
     double start = now();
     if (!import_progress(&m->job, "reading", 0, sample_count(m))) return false;
@@ -214,11 +210,11 @@ static bool read_heights(import *m) {
 }
 
 static bool errors_progress(void *context, double done) {
-    const import *m = context;
+    const import_work *m = context;
     return import_progress(&m->job, "errors", done, sample_count(m));
 }
 
-static bool compute_errors(import *m) {
+static bool compute_errors(import_work *m) {
     double start = now();
     rqt_status status = rqt_errors_compute(&m->grid, &m->heights.unit, &m->cost, import_allocator(),
                                            errors_progress, m, &m->errors);
@@ -239,7 +235,7 @@ static rqt_code largest_error(const rqt_errors *errors) {
 }
 
 /* File names, one a line. */
-static char *provenance(const import *m) {
+static char *provenance(const import_work *m) {
     size_t size = 1;
     for (int i = 0; i < m->count; i++) size += strlen(m->sources[i].base) + 1;
     char *text = malloc(size), *end = text;
@@ -247,7 +243,7 @@ static char *provenance(const import *m) {
     return text;
 }
 
-static bool write_terrain(import *m, store_terrain *info) {
+static bool write_terrain(import_work *m, store_terrain *info) {
     const import_job *job = &m->job;
     rqt_pyramid *pyramid = NULL;
     store_writer *writer = NULL;
@@ -257,22 +253,22 @@ static bool write_terrain(import *m, store_terrain *info) {
     if (status != RQT_OK)
         return status == RQT_NO_MEMORY ? import_no_memory(job, "making blocks")
                                        : import_refuse(job, "blocks cannot be made (status %d)", (int)status);
-    bool ok = import_database_begin(job, m->path, m->k, &m->database);
+    bool ok = import_database_begin(job, m->k, &m->database);
     if (ok) {
         int code = store_writer_begin(m->database.db, info, job->options->replace, &writer, &detail);
-        if (code != SQLITE_OK) ok = import_database_refuse(job, m->path, code, detail);
+        if (code != SQLITE_OK) ok = import_database_refuse(job, code, detail);
     }
-    ok = ok && import_blocks(job, pyramid, m->k, quantum, writer, m->path, sample_count(m), m->report);
+    ok = ok && import_blocks(job, pyramid, m->k, quantum, writer, sample_count(m), m->report);
     if (ok) {
         int code = store_writer_finish(writer, largest_error(&m->errors), &detail);
-        if (code != SQLITE_OK) ok = import_database_refuse(job, m->path, code, detail);
+        if (code != SQLITE_OK) ok = import_database_refuse(job, code, detail);
     }
     store_writer_free(writer);
     rqt_pyramid_free(pyramid);
     return ok && import_database_commit(job, &m->database);
 }
 
-static bool write_database(import *m) {
+static bool write_database(import_work *m) {
     double start = now();
     char created[32];
     time_t seconds = time(NULL);
@@ -304,7 +300,7 @@ static bool write_database(import *m) {
 
 int import_run(const char *const *sources, int count, const char *database, const import_options *options,
                import_report *report, char *message, size_t message_size) {
-import m = {.job = {options, message, message_size }, .count = count, .path = database, .report = report };
+    import_work m = {.job = {options, database, message, message_size}, .count = count, .report = report};
     *report = (import_report){0};
     if (message && message_size) message[0] = 0;
     GDALAllRegister();
@@ -315,10 +311,10 @@ import m = {.job = {options, message, message_size }, .count = count, .path = da
 
     bool ok = check_options(&m.job, count) && describe(&m, sources);
     if (ok) name_of(options, &m.sources[0], report->name);
-    ok = ok && import_database_probe(&m.job, database, report->name) && read_heights(&m) && compute_errors(&m) &&
+    ok = ok && import_database_probe(&m.job, report->name) && read_heights(&m) && compute_errors(&m) &&
          write_database(&m);
 
-    import_database_close(&m.database);
+    import_database_close(&m.job, &m.database);
     rqt_errors_free(&m.errors, import_allocator());
     import_samples_free(&m.samples);
     free(m.heights.q);

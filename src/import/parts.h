@@ -17,6 +17,7 @@
 /* What every part is handed: the wishes of the caller and the place for the sentence of a failure. */
 typedef struct import_job {
     const import_options *options;
+    const char *database; /* path */
     char *message;
     size_t message_size;
 } import_job;
@@ -115,13 +116,12 @@ bool import_quantise(const import_job *job, import_samples *samples, const impor
 /* Encode every block of the pyramid with options->jobs threads and write them in ascending order of number.
  * quantum: metres of one quantum. Adds to report->blocks and ->bytes. */
 bool import_blocks(const import_job *job, const rqt_pyramid *pyramid, int k, double quantum, store_writer *writer,
-                   const char *database, int64_t samples, import_report *report);
+                   int64_t samples, import_report *report);
 /* Bytes of memory that it takes for itself. */
 size_t import_blocks_bytes(int k, int jobs);
 
 /* ---------------------------------------------------------------------------------------------- database.c -- */
 typedef struct import_database {
-    const char *path;
     sqlite3 *db;
     bool created;  /* the file is ours: it goes when the import fails */
     bool made_wal; /* it was not WAL before */
@@ -129,13 +129,13 @@ typedef struct import_database {
 
 /* Everything that can be refused without the samples: not SQLite, read-only, locked, the terrain exists. Leaves no
  * trace. */
-bool import_database_probe(const import_job *job, const char *path, const char *terrain);
+bool import_database_probe(const import_job *job, const char *terrain);
 /* Open, create if needed, and begin the transaction. */
-bool import_database_begin(const import_job *job, const char *path, int k, import_database *database);
+bool import_database_begin(const import_job *job, int k, import_database *database);
 bool import_database_commit(const import_job *job, import_database *database);
 /* Close. Without a commit before, the database is as it was, and a file that we created is gone. */
-void import_database_close(import_database *database);
+void import_database_close(const import_job *job, import_database *database);
 /* The sentence for an SQLite failure; takes over detail (sqlite3_free), which may be NULL. False. */
-bool import_database_refuse(const import_job *job, const char *path, int code, char *detail);
+bool import_database_refuse(const import_job *job, int code, char *detail);
 
 #endif

@@ -190,6 +190,18 @@ static void describe_voids(GDALRasterBandH band, import_source *s) {
     s->has_mask = !(flags & (GMF_ALL_VALID | GMF_NODATA));
 }
 
+/* The database that is written must not be read at the same time: is it a file of this dataset? */
+static bool is_database(const import_job *job, GDALDatasetH dataset, const char *path) {
+    struct stat database, file;
+    if (stat(job->database, &database)) return false;
+    bool same = !stat(path, &file) && file.st_dev == database.st_dev && file.st_ino == database.st_ino;
+    char **files = GDALGetFileList(dataset);
+    for (char **name = files; name && *name && !same; name++)
+        same = !stat(*name, &file) && file.st_dev == database.st_dev && file.st_ino == database.st_ino;
+    CSLDestroy(files);
+    return same;
+}
+
 bool import_source_describe(const import_job *job, const char *path, import_source *s) {
     *s = (import_source){.path = path, .unit = {1, 1, 1}};
     GDALDatasetH dataset = source_open(job, path, &s->opened);
@@ -199,6 +211,8 @@ bool import_source_describe(const import_job *job, const char *path, import_sour
     int bands = GDALGetRasterCount(dataset);
     if (!s->base) {
         import_no_memory(job, "describing a source");
+    } else if (is_database(job, dataset, path)) {
+        import_refuse(job, "%s is part of the source %s and cannot be the database too", job->database, path);
     } else if (bands == 0) {
         bool parts = GDALGetMetadata(dataset, "SUBDATASETS") != NULL;
         import_refuse(job, "%s holds no raster band%s", path,
@@ -229,19 +243,6 @@ void import_source_free(import_source *s) {
     free(s->base);
     if (s->crs) OSRDestroySpatialReference(s->crs);
     *s = (import_source){0};
-}
-
-bool import_source_is_file(const import_source *source, const char *path) {
-    struct stat wanted, file;
-    if (stat(path, &wanted)) return false;
-    GDALDatasetH dataset = dataset_open(source->opened);
-    char **files = dataset ? GDALGetFileList(dataset) : NULL;
-    bool same = !stat(source->path, &file) && file.st_dev == wanted.st_dev && file.st_ino == wanted.st_ino;
-    for (char **name = files; name && *name && !same; name++)
-        same = !stat(*name, &file) && file.st_dev == wanted.st_dev && file.st_ino == wanted.st_ino;
-    CSLDestroy(files);
-    if (dataset) GDALClose(dataset);
-    return same;
 }
 
 rqt_unit import_source_unit(const import_source *s) {

@@ -32,9 +32,6 @@ typedef struct import_source {
 
 bool import_source_describe(const import_job *job, const char *path, import_source *source);
 void import_source_free(import_source *source);
-/* Is this file one of those that the source consists of? */
-bool import_source_is_file(const import_source *source, const char *path);
-
 /* Metres of a raw value: raw * factor + offset, as rqt_unit_metres has it for z0 = 0, d = 1. */
 rqt_unit import_source_unit(const import_source *source);
 

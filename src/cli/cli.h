@@ -1,0 +1,141 @@
+/* cli.h - what the commands share: sentences, options, databases, tables, progress, output files.
+ *
+ * A command is a function of argc and argv that returns the exit status. It asks the database through the SQL
+ * functions, as any other program would, so that what the command shows is what SQL says. Two places go past SQL:
+ * import, which is a room of its own, and the picture, which needs the samples under a window.
+ *
+ * Data goes to stdout, everything else to stderr. Exit status: 0 done, 1 the operation or the check failed, 2 the
+ * command line is wrong or asks for something that is not in this version.
+ */
+#ifndef RQT_CLI_H
+#define RQT_CLI_H
+
+#include "store.h"
+
+#include <getopt.h>
+#include <signal.h>
+
+enum { CLI_OK = 0, CLI_FAILED = 1, CLI_USAGE = 2 };
+
+typedef struct cli_command {
+    const char *name;
+    const char *summary; /* one line of rqt --help */
+    const char *help;    /* the text of rqt NAME --help */
+    int (*run)(int argc, char **argv);
+} cli_command;
+
+extern const cli_command command_import, command_info, command_check, command_verify, command_mesh;
+
+/* ------------------------------------------------------------------------------------ sentences (main.c) -- */
+/* The command whose name goes before every sentence. */
+extern const cli_command *cli_current;
+
+/* "rqt NAME: sentence" on stderr; _usage adds where help is found. They return their exit status. */
+int cli_fail(const char *format, ...) __attribute__((format(printf, 1, 2)));
+int cli_usage(const char *format, ...) __attribute__((format(printf, 1, 2)));
+/* The same without being a failure. */
+void cli_say(const char *format, ...) __attribute__((format(printf, 1, 2)));
+/* The help of the current command, on stdout. */
+int cli_help(void);
+
+/* -------------------------------------------------------------------------------------- options (options.c) -- */
+#define CLI_MAX_EPS 12
+
+/* getopt_long with sentences of our own. Returns the option's value, -1 after the last one, '?' when a sentence has
+ * been said and CLI_USAGE is due. */
+int cli_option(int argc, char **argv, const char *shorts, const struct option *longs);
+/* The whole text as a finite number; as an integer of low..high. */
+bool cli_number(const char *text, double *value);
+bool cli_integer(const char *text, int64_t low, int64_t high, int64_t *value);
+/* "5" or "1,2,5": numbers >= 0, their count; 0 after a sentence. */
+int cli_eps(const char *text, double eps[CLI_MAX_EPS]);
+/* A region as WKT: four numbers x0,y0,x1,y1 become a polygon, everything else is passed on as it is. NULL after a
+ * sentence. Released with free. */
+char *cli_region(const char *text);
+
+/* ------------------------------------------------------------------------------------ databases (database.c) -- */
+/* Read-only, with the SQL functions. NULL after a sentence. */
+sqlite3 *cli_open(const char *path);
+/* A statement with up to three of the arguments that most functions share; NULL after a sentence. */
+sqlite3_stmt *cli_prepare(sqlite3 *db, const char *sql);
+/* Says what SQLite has to say about the connection's last failure, as a sentence; returns CLI_FAILED. */
+int cli_fail_database(sqlite3 *db);
+/* The same for a code and a sentence from the store, which it releases. */
+int cli_fail_store(int code, char *sentence);
+/* Several statements; false after a sentence. */
+bool cli_execute(sqlite3 *db, const char *sql);
+/* Binds region (WKT or NULL), eps and terrain (or NULL) to ?1, ?2, ?3. */
+void cli_bind_query(sqlite3_stmt *statement, const char *region, double eps, const char *terrain);
+/* The terrain of this name, or the only one; with the store that it lives in. false after a sentence. */
+bool cli_find_terrain(sqlite3 *db, const char *name, store **s, const store_terrain **terrain);
+
+/* What rqt_verify() says. */
+typedef struct cli_proof {
+    int64_t samples, vertices, triangles;
+    double max_error, rms_error;
+    bool has_worst;
+    double x, y;
+    int64_t t_junctions, overlaps, uncovered;
+} cli_proof;
+bool cli_verify(sqlite3 *db, const char *region, double eps, const char *terrain, cli_proof *proof);
+/* Does the proof hold for a tolerance, on a terrain whose heights are rounded by quantum_error? */
+bool cli_proof_holds(const cli_proof *proof, double eps, double quantum_error);
+
+/* ------------------------------------------------------------------------------------------ text (text.c) -- */
+/* Texts of a ring of buffers: good for the arguments of one printf. */
+const char *cli_count(int64_t n);         /* 1 234 567 */
+const char *cli_real(double value);       /* 6 significant digits, no trailing zeros */
+const char *cli_place(double value, bool lonlat); /* a coordinate, to 0.1 m or better, no trailing zeros */
+const char *cli_length(double metres);    /* 850 m, 12.3 km */
+const char *cli_crs_name(const char *wkt); /* the name in a WKT, "none" when there is none */
+
+/* A table of texts, columns aligned by what they hold. Memory that is missing makes it incomplete and cli_table_print
+ * say so. */
+typedef struct cli_table {
+    int columns, rows;
+    const char *left; /* 'l' or 'r' per column */
+    char **cells;     /* rows * columns */
+    bool incomplete;
+} cli_table;
+void cli_table_begin(cli_table *table, int columns, const char *align);
+void cli_table_add(cli_table *table, const char *const *cells);
+void cli_table_print(cli_table *table); /* and release */
+
+/* ------------------------------------------------------------------------------------ terrain on the ground -- */
+/* Metres of ground for one column and one row in the middle of a window; for lon/lat at the middle latitude. */
+void cli_ground(const store_terrain *terrain, int32_t row0, int32_t rows, double *per_column, double *per_row);
+
+/* ------------------------------------------------------------------------------------ progress (progress.c) -- */
+typedef struct cli_progress {
+    bool shown; /* stderr is a terminal */
+    bool dirty; /* there is a line to wipe */
+    char stage[32];
+    double start, last; /* seconds */
+} cli_progress;
+void cli_progress_begin(cli_progress *progress);
+void cli_progress_show(cli_progress *progress, const char *stage, double done, int64_t samples);
+void cli_progress_wipe(cli_progress *progress);
+double cli_seconds(void); /* of a clock that only goes forward */
+
+/* --------------------------------------------------------------------------------- output files (output.c) -- */
+/* A file under a temporary name beside its own, renamed when it is whole. A signal that ends the process removes
+ * it, and a failure does when _discard is called. One at a time. */
+typedef struct cli_output {
+    const char *path;
+    char temporary[4096];
+} cli_output;
+/* Refuses folders and the file `forbidden`. The temporary file does not exist yet. */
+bool cli_output_begin(cli_output *output, const char *path, const char *forbidden);
+bool cli_output_write(const cli_output *output, const void *bytes, size_t size);
+bool cli_output_finish(cli_output *output); /* renames; discards when that fails */
+void cli_output_discard(cli_output *output);
+
+/* ------------------------------------------------------------------------------------------ what mesh writes -- */
+/* One layer, a row per triangle (layer.c). */
+int cli_write_layer(sqlite3 *db, const char *region, double eps, const char *terrain, const char *options,
+                    const cli_output *output);
+/* A picture (picture.c): panels of shaded relief and mesh, width units wide. */
+int cli_write_picture(sqlite3 *db, const char *region, const double *eps, int count, const char *terrain,
+                      const char *options, int width, bool svg, const cli_output *output);
+
+#endif

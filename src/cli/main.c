@@ -1,0 +1,112 @@
+/* main.c - the rqt command: which command is meant, and how it speaks.
+ *
+ * Every sentence on stderr begins with the command that says it ("rqt mesh: ..."), so that it can be placed in the log
+ * of a script that calls several.
+ */
+#include "cli.h"
+#include "import.h"
+
+#include <errno.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+static const cli_command *const COMMANDS[] = {&command_import, &command_info, &command_check, &command_verify,
+                                              &command_mesh};
+enum { COMMAND_COUNT = sizeof COMMANDS / sizeof *COMMANDS };
+
+/* In the contract of the command line, and still to come. */
+static const char *const LATER[] = {"update", "serve", "chart"};
+
+const cli_command *cli_current;
+
+static void speak(const char *format, va_list list) {
+    fflush(stdout); /* so that a terminal shows both streams in the order of events */
+    fprintf(stderr, "rqt%s%s: ", cli_current ? " " : "", cli_current ? cli_current->name : "");
+    vfprintf(stderr, format, list);
+    fputc('\n', stderr);
+}
+
+void cli_say(const char *format, ...) {
+    va_list list;
+    va_start(list, format);
+    speak(format, list);
+    va_end(list);
+}
+
+int cli_fail(const char *format, ...) {
+    va_list list;
+    va_start(list, format);
+    speak(format, list);
+    va_end(list);
+    return CLI_FAILED;
+}
+
+int cli_usage(const char *format, ...) {
+    va_list list;
+    va_start(list, format);
+    speak(format, list);
+    va_end(list);
+    fprintf(stderr, "Try: rqt %s%s--help\n", cli_current ? cli_current->name : "", cli_current ? " " : "");
+    return CLI_USAGE;
+}
+
+int cli_help(void) {
+    fputs(cli_current->help, stdout);
+    return CLI_OK;
+}
+
+static int help_of_all(void) {
+    puts("rqt: terrain inside a database, and meshes of it with a proven error\n"
+         "\n"
+         "Usage: rqt COMMAND [OPTION...] ARGUMENT...\n"
+         "\n"
+         "Commands:");
+    for (int i = 0; i < COMMAND_COUNT; i++) printf("  %-8s %s\n", COMMANDS[i]->name, COMMANDS[i]->summary);
+    puts("\n"
+         "rqt COMMAND --help tells its options. rqt --version tells the version.\n"
+         "\n"
+         "Examples:\n"
+         "  rqt import N44W072.hgt.zip alps.gpkg                  a raster becomes a terrain of a database\n"
+         "  rqt info alps.gpkg                                    what is in the database\n"
+         "  rqt mesh alps.gpkg --eps 5,20,80 -o washington.png    its mesh at three tolerances, as a picture\n"
+         "\n"
+         "Exit status: 0 done, 1 failed or a check that did not hold, 2 bad usage.\n"
+         "Data goes to stdout, messages to stderr.");
+    return CLI_OK;
+}
+
+static int version(void) {
+    printf("rqt %s (SQLite %s, GDAL %s)\n", RQT_VERSION, sqlite3_libversion(), import_gdal_version());
+    return CLI_OK;
+}
+
+static const cli_command *find(const char *name) {
+    for (int i = 0; i < COMMAND_COUNT; i++)
+        if (!strcmp(COMMANDS[i]->name, name)) return COMMANDS[i];
+    return NULL;
+}
+
+static int dispatch(int argc, char **argv) {
+    if (argc < 2) return cli_usage("a command is missing: import, info, check, verify or mesh");
+    const char *name = argv[1];
+    if (!strcmp(name, "--help") || !strcmp(name, "-h") || (!strcmp(name, "help") && argc == 2)) return help_of_all();
+    if (!strcmp(name, "--version") || !strcmp(name, "-V") || !strcmp(name, "version")) return version();
+    const bool help = !strcmp(name, "help");
+    if (help) name = argv[2];
+    for (size_t i = 0; i < sizeof LATER / sizeof *LATER; i++)
+        if (!strcmp(name, LATER[i])) return cli_usage("the command %s is not in this version", name);
+    const cli_command *command = find(name);
+    if (!command)
+        return cli_usage("there is no %s %s: the commands are import, info, check, verify and mesh",
+                         name[0] == '-' ? "option" : "command", name);
+    cli_current = command;
+    return help ? cli_help() : command->run(argc - 1, argv + 1);
+}
+
+int main(int argc, char **argv) {
+    int status = dispatch(argc, argv);
+    /* What was printed is only done when it is out: a full disk shows here. */
+    if ((fflush(stdout) || ferror(stdout)) && status == CLI_OK) status = cli_fail("stdout: %s", strerror(errno));
+    return status;
+}
