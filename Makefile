@@ -32,8 +32,8 @@ CAIRO_CFLAGS = $(shell pkg-config --cflags cairo libpng 2>/dev/null)
 
 .PHONY: all
 all: ## build the command and the extension: build/rqt and build/rqt.so
-	@./tests/setup.sh build
-	@$(MAKE) --no-print-directory products
+	@./src/install-packages.sh build
+	@$(MAKE) --no-print-directory -j2 products
 
 .PHONY: products
 products: $(BUILD)/rqt $(BUILD)/rqt.so
@@ -75,4 +75,99 @@ $(BUILD)/generated/schema_sql.h: sql/schema.sql sql/terrain.sql sql/geopackage.s
 	  sed -e '/^--/d' -e 's/\\/\\\\/g' -e 's/"/\\"/g' -e 's/^/    "/' -e 's/$$/\\n"/' sql/$$f.sql; printf '    ;\n'; \
 	done > $@
 
+# ------------------------------------------------------------------------------------------------------- demo
+.PHONY: demo
+demo: all ## import a real DEM and show what rqt does with it; pictures in build/demo
+	@BUILD=$(BUILD) ./examples/demo.sh
+
+# ------------------------------------------------------------------------------------------------------ tests
+# Everything that a test may want of us in one archive; the linker takes what each one needs.
+TEST_PROGRAMS = $(patsubst tests/%.c,$(BUILD)/tests/%,$(wildcard tests/test_*.c))
+TEST_PARTS = $(BUILD)/tests/oracle.o $(SQL_LINKED) $(IMPORT) $(PLAIN) $(GEO)
+LIBS_TEST = -lcmocka -lgmp -lproj $(LIBS_CLI)
+
+$(BUILD)/tests/oracle.o: tests/oracle.c
+	@mkdir -p $(@D)
+	@echo "  compile $<"; $(CC) $(CFLAGS) -c $< -o $@
+$(BUILD)/tests/libtest.a: $(TEST_PARTS) $(CORE)
+	@rm -f $@
+	@ar rcs $@ $^
+$(BUILD)/tests/test_%.o: tests/test_%.c $(GENERATED)
+	@mkdir -p $(@D)
+	@echo "  compile $<"; $(CC) $(CFLAGS) $(INCLUDES) -Itests -DSQLITE_CORE $(GDAL_CFLAGS) -c $< -o $@
+$(BUILD)/tests/test_%: $(BUILD)/tests/test_%.o $(BUILD)/tests/libtest.a
+	@$(CXX) $(SANITIZE) -o $@ $^ $(LIBS_TEST)
+
+.PHONY: test-programs test test-quick test-sanitize
+test-programs: $(TEST_PROGRAMS)
+
+test: ## install, build, and pass every test (also under ASan and UBSan)
+	@./src/install-packages.sh build test
+	@$(MAKE) --no-print-directory -j2 products test-programs
+	@$(MAKE) --no-print-directory -j2 BUILD=$(BUILD)/sanitized OPTIMIZE=-O1 \
+	  SANITIZE="-fsanitize=address,undefined -fno-sanitize-recover=undefined" products test-programs
+	@BUILD=$(BUILD) ./tests/run.sh
+
+test-quick: ## the tests without the sanitized build
+	@./src/install-packages.sh build test
+	@$(MAKE) --no-print-directory -j2 products test-programs
+	@BUILD=$(BUILD) ./tests/run.sh quick
+
+.PHONY: mutants
+mutants: ## break the code in one line, many times over: each time a named test must go red
+	@./src/install-packages.sh build test
+	@BUILD=$(BUILD) ./tests/mutants.sh
+
+DATA ?= tests/data
+.PHONY: verify-data
+verify-data: ## rqt_verify over every DEM of DATA=dir at nine eps
+	@./src/install-packages.sh build test
+	@$(MAKE) --no-print-directory -j2 products
+	@BUILD=$(BUILD) ./tests/bench/verify_data.sh $(DATA)
+
+.PHONY: check-layers
+check-layers: ## the rooms' one direction of dependency; what librqt.a and rqt.so may mention
+	@./src/install-packages.sh build test
+	@$(MAKE) --no-print-directory -j2 products
+	@BUILD=$(BUILD) ./tests/check_layers.sh
+
+FORMATTED = $(wildcard src/*/*.[ch] src/geo/*.cpp ext/*.[ch] tests/*.[ch] tests/bench/*.[ch])
+.PHONY: format check-format
+format: ## lay the sources out (clang-format)
+	@./src/install-packages.sh format
+	clang-format -i $(FORMATTED)
+check-format: ## fail when a source is not laid out
+	@./src/install-packages.sh format
+	@clang-format --dry-run -Werror $(FORMATTED) && echo "layout: all of $(words $(FORMATTED)) files"
+
+.PHONY: docs check-docs
+docs: products ## write ext/SQL.md from the function table
+	@./tests/sql_reference.sh $(BUILD) > ext/SQL.md
+check-docs: products
+	@./tests/sql_reference.sh $(BUILD) | diff -u ext/SQL.md - && echo "ext/SQL.md is what the function table says"
+
+# ---------------------------------------------------------------------------------------------------- benches
+.PHONY: bench bench-table1
+bench: ## speed and size beside GDAL's, medians of five and more
+	@./src/install-packages.sh build test
+	@$(MAKE) --no-print-directory -j2 products
+	@BUILD=$(BUILD) ./tests/bench/bench.sh
+bench-table1: ## share of vertices over eps beside the paper's table 1
+	@./src/install-packages.sh build test
+	@$(MAKE) --no-print-directory -j2 products
+	@BUILD=$(BUILD) ./tests/bench/bench_table1.sh
+
+# ---------------------------------------------------------------------------------------------------- install
+PREFIX ?= /usr/local
+.PHONY: install clean help
+install: all ## copy rqt to PREFIX/bin and rqt.so to PREFIX/lib
+	install -D -m 755 $(BUILD)/rqt $(DESTDIR)$(PREFIX)/bin/rqt
+	install -D -m 644 $(BUILD)/rqt.so $(DESTDIR)$(PREFIX)/lib/rqt.so
+clean: ## remove the build directory
+	rm -rf $(BUILD)
+help: ## this list
+	@sed -n 's/^\([a-z0-9-]*\):.*## \(.*\)/\1|\2/p' $(firstword $(MAKEFILE_LIST)) | awk -F'|' '{ printf "  make %-14s %s\n", $$1, $$2 }'
+
+# Keep what the test programs are made of.
+.SECONDARY:
 -include $(shell find $(BUILD) -name '*.d' 2>/dev/null)

@@ -1,5 +1,5 @@
 -- One row a terrain. Heights are integers q: metres = ((double)z0 + q / (double)d) * f + height_offset with
--- f = scale * unit_numerator / unit_denominator. Sample (col,row) is at (x0 + col*dx, y0 + row*dy); row 0 is the north.
+-- f = scale * (unit_numerator / (double)unit_denominator). Sample (col,row) is at (x0 + col*dx, y0 + row*dy); row 0 is the north.
 -- Its blocks are in rqt_block_ID, their index in rqt_index_ID (terrain.sql). complete = 0: an import that did not finish.
 CREATE TABLE IF NOT EXISTS rqt_terrain (
   id INTEGER PRIMARY KEY AUTOINCREMENT,

@@ -165,7 +165,7 @@ void oracle_deviation(const oracle *o, const oracle_triangle *t, mpq_t metres) {
 }
 
 /* What one triangle adds to its split vertex: its error in metres, and whether it is mixed. */
-static void triangle_error(const oracle *o, const oracle_triangle *t, mpq_t metres, int *mixed) {
+void oracle_triangle_error(const oracle *o, const oracle_triangle *t, mpq_t metres, int *mixed) {
     oracle_point p[3], low, high;
     clamp_corners(o, t, p);
     long area = labs(cross(p[0], p[1], p[2]));
@@ -213,7 +213,7 @@ static void visit(oracle *o, const oracle_triangle *t) {
     mpq_t metres;
     int mixed;
     mpq_init(metres);
-    triangle_error(o, t, metres, &mixed);
+    oracle_triangle_error(o, t, metres, &mixed);
     if (mpq_cmp(metres, n->raw) > 0) mpq_set(n->raw, metres);
     n->raw_outline |= mixed;
     mpq_clear(metres);
@@ -248,12 +248,12 @@ static void saturate(oracle *o) {
     }
 }
 
-void oracle_create(oracle *o, const oracle_terrain *terrain) {
+void oracle_create_bare(oracle *o, const oracle_terrain *terrain) {
     o->terrain = *terrain;
     o->K = 0;
     while ((1 << o->K) + 1 < terrain->width || (1 << o->K) + 1 < terrain->height) o->K++;
     o->side = (1 << o->K) + 1;
-    o->node = take((size_t)(o->side * o->side), sizeof *o->node);
+    o->node = NULL;
     mpq_t other;
     mpq_inits(o->quantum, other, NULL);
     mpq_set_d(o->quantum, terrain->scale);
@@ -265,6 +265,11 @@ void oracle_create(oracle *o, const oracle_terrain *terrain) {
     mpq_set_si(other, terrain->d, 1);
     mpq_div(o->quantum, o->quantum, other);
     mpq_clear(other);
+}
+
+void oracle_create(oracle *o, const oracle_terrain *terrain) {
+    oracle_create_bare(o, terrain);
+    o->node = take((size_t)(o->side * o->side), sizeof *o->node);
     for (int n = 0; n < o->side * o->side; n++) mpq_inits(o->node[n].raw, o->node[n].saturated, NULL);
     for (int which = 0; which < 2; which++) {
         oracle_triangle t = root_half(o, which);
@@ -285,7 +290,7 @@ void oracle_create(oracle *o, const oracle_terrain *terrain) {
 }
 
 void oracle_free(oracle *o) {
-    for (int n = 0; n < o->side * o->side; n++) mpq_clears(o->node[n].raw, o->node[n].saturated, NULL);
+    for (int n = 0; o->node && n < o->side * o->side; n++) mpq_clears(o->node[n].raw, o->node[n].saturated, NULL);
     mpq_clear(o->quantum);
     free(o->node);
     o->node = NULL;

@@ -62,6 +62,9 @@ typedef struct oracle_list {
 
 /* The arrays of the terrain must outlive the oracle. */
 void oracle_create(oracle *o, const oracle_terrain *terrain);
+/* Without the lattice, for rasters that are too large for it: then only functions of single triangles and of codes
+ * may be called. */
+void oracle_create_bare(oracle *o, const oracle_terrain *terrain);
 void oracle_free(oracle *o);
 const oracle_node *oracle_at(const oracle *o, int x, int y);
 /* The sample that a lattice vertex stands for, and whether it has data. */
@@ -90,6 +93,8 @@ void oracle_list_free(oracle_list *list);
 
 /* Twice the area of the clamped triangle, >= 0, in samples. */
 long oracle_area(const oracle *o, const oracle_triangle *t);
+/* What a triangle adds to its split vertex: its error in metres, the cost of an outline included; is it mixed? */
+void oracle_triangle_error(const oracle *o, const oracle_triangle *t, mpq_t metres, int *mixed);
 /* The largest deviation in metres over the valid samples of the closed clamped triangle. Its corners are valid. */
 void oracle_deviation(const oracle *o, const oracle_triangle *t, mpq_t metres);
 

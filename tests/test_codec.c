@@ -34,10 +34,16 @@ enum {
     AT_MESH_CHECKSUM = 8
 };
 
+typedef struct heap {
+    size_t live, calls, refuse; /* refuse: the one request that is refused, counted from 1; 0: none */
+} heap;
+static heap the_heap;
+
 /* ------------------------------------------------------------------------------------------- random -- */
 static uint64_t random_seed, random_state;
 
 static void random_begin(const char *test) {
+    the_heap = (heap){0, 0, 0}; /* whatever a test before has left behind is that test's failure */
     random_state = random_seed;
     for (; *test; test++) random_state = random_state * 1099511628211U + (unsigned char)*test;
 }
@@ -53,14 +59,10 @@ static uint32_t random_below(uint32_t n) {
     return (uint32_t)(random_bits() % n);
 }
 static int32_t random_height(void) {
-    return (int32_t)random_below(2 * RQT_HEIGHT_LIMIT - 1) - (RQT_HEIGHT_LIMIT - 1);
+    return (int32_t)random_below(2 * (uint32_t)RQT_HEIGHT_LIMIT - 1) - (RQT_HEIGHT_LIMIT - 1);
 }
 
 /* --------------------------------------------------------------------------------------------- heap -- */
-typedef struct heap {
-    size_t live, calls, refuse; /* refuse: the one request that is refused, counted from 1; 0: none */
-} heap;
-
 static void *heap_resize(void *context, void *p, size_t bytes) {
     heap *h = context;
     if (bytes == 0) {
@@ -76,7 +78,6 @@ static void *heap_resize(void *context, void *p, size_t bytes) {
     return fresh;
 }
 
-static heap the_heap;
 static const rqt_allocator allocator = {heap_resize, &the_heap};
 
 static void *take(size_t bytes) {
@@ -105,7 +106,7 @@ static rqt_block new_block(int k) {
 }
 
 /* ------------------------------------------------------------------------------------------- blocks -- */
-typedef enum kind { FLAT, SLOPE, TERRAIN, NOISE, FULL_RANGE, EXTREMES, KINDS } kind;
+typedef enum terrain { FLAT, SLOPE, TERRAIN, NOISE, FULL_RANGE, EXTREMES, KINDS } terrain;
 typedef enum errors { NO_ERRORS, LIKELY_ERRORS, ANY_ERRORS, INFINITE_ERRORS, ERRORS } errors;
 
 static int side_of(int k) {
@@ -115,7 +116,7 @@ static size_t count_of(int k) {
     return (size_t)side_of(k) * (size_t)side_of(k);
 }
 
-static int32_t height_of(kind what, int x, int y) {
+static int32_t height_of(terrain what, int x, int y) {
     switch (what) {
     case FLAT:
         return 1234;
@@ -146,7 +147,8 @@ static rqt_code error_of(errors what) {
 }
 
 /* voids and outline: one in so many; 0 none, 1 all. */
-static void fill(rqt_block *b, int width, int height, kind what, uint32_t voids, errors error, uint32_t outline) {
+static void fill(rqt_block *b, int width, int height, terrain what, uint32_t voids, errors error,
+                 uint32_t outline) {
     const int n = side_of(b->k);
     b->width = width;
     b->height = height;
@@ -224,7 +226,7 @@ static void a_block_comes_back_whatever_its_size_heights_voids_errors_and_outlin
     rqt_codec *codec = new_codec();
     for (int k = 0; k <= RQT_MAX_BLOCK_K; k++) {
         rqt_block block = new_block(k);
-        for (kind what = FLAT; what < KINDS; what++)
+        for (terrain what = FLAT; what < KINDS; what++)
             for (errors error = NO_ERRORS; error < ERRORS; error++)
                 for (size_t voids = 0; voids < 5; voids++) {
                     const uint32_t outline = k < 5 ? shares[random_below(5)] : shares[voids];
@@ -418,6 +420,136 @@ static void what_cannot_be_stored_is_refused(void **state) {
     rqt_codec_free(codec);
 }
 
+/* ----------------------------------------------------------------------------------------- reference --
+ * FORMAT.md once more, word by word and without a thought for speed. What is stored must stay readable: code that
+ * predicts otherwise would still pass every round trip. */
+static uint32_t plane_value(const uint8_t *p, size_t plane, int planes, size_t at) {
+    uint32_t v = 0;
+    for (int n = 0; n < planes; n++) v |= (uint32_t)p[(size_t)n * plane + at] << 8 * n;
+    return v;
+}
+
+static uint32_t unzigzag(uint32_t v) {
+    return v % 2 ? 0 - v / 2 - 1 : v / 2;
+}
+
+static uint32_t reference_midpoint(const int32_t *q, int n, double quantum, int x, int y, int dx, int dy) {
+    const uint32_t t =
+        2 * (uint32_t)q[y * n + x] - (uint32_t)q[(y - dy) * n + x - dx] - (uint32_t)q[(y + dy) * n + x + dx];
+    double h = quantum * (0.5 - ldexp(1, -21));
+    h = h < ldexp(1, -90) ? ldexp(1, -90) : h > ldexp(1, 90) ? ldexp(1, 90) : h;
+    const float v = fabsf((float)(int32_t)t) * (float)h;
+    uint32_t code = 0;
+    if (v > 0) /* the smallest code c with (128 + c % 128) * 2^(c / 128 - 263) >= v */
+        for (code = (uint32_t)(ilogb(v) + 256) * 128; ldexp(128 + code % 128, (int)(code / 128) - 263) < v;) code++;
+    return code;
+}
+
+static void reference_code(const rqt_block_header *h, const int32_t *q, rqt_code *error, int x, int y, int q_step,
+                           bool centre, uint32_t residual) {
+    const int n = side_of(h->k), half = q_step / 2;
+    uint32_t p = 0;
+    for (int c = 0; c < 4; c++) {
+        int cx = x, cy = y;
+        if (centre) {
+            cx += c == 0 ? -q_step : c == 1 ? q_step : 0;
+            cy += c == 2 ? -q_step : c == 3 ? q_step : 0;
+        } else {
+            cx += c % 2 ? half : -half;
+            cy += c / 2 ? half : -half;
+        }
+        if ((centre || half) && cx >= 0 && cx < n && cy >= 0 && cy < n && error[cy * n + cx] > p)
+            p = error[cy * n + cx];
+    }
+    uint32_t middle = 0;
+    if (!centre) {
+        const bool even = y / q_step % 2 == 0;
+        middle = reference_midpoint(q, n, h->quantum, x, y, even ? q_step : 0, even ? 0 : q_step);
+    } else if (2 * q_step != n - 1) {
+        const bool alike = (x - q_step) / (2 * q_step) % 2 == (y - q_step) / (2 * q_step) % 2;
+        middle = reference_midpoint(q, n, h->quantum, x, y, q_step, alike ? q_step : -q_step);
+    }
+    error[y * n + x] = (rqt_code)((middle > p ? middle : p) + unzigzag(residual));
+}
+
+static void reference_decode(bytes b, rqt_block *block) {
+    rqt_block_header h;
+    assert_int_equal(rqt_block_info(b.data, b.size, &h, NULL), RQT_OK);
+    const int n = side_of(h.k);
+    const size_t stored = (size_t)(h.width * h.height), count = count_of(h.k);
+    uint8_t *payload = take(h.payload);
+    assert_int_equal(ZSTD_decompress(payload, h.payload, b.data + HEADER_BYTES, b.size - HEADER_BYTES), h.payload);
+    const uint8_t *errors_at = payload + stored * (size_t)h.height_planes;
+    const uint8_t *bits = errors_at + count * (size_t)h.error_planes;
+    int32_t *q = block->q;
+    for (int y = 0; y < n; y++)
+        for (int x = 0; x < n; x++) {
+            const int at = y * n + x;
+            if (x >= h.width || y >= h.height) {
+                const int from = (y < h.height ? y : h.height - 1) * n + (x < h.width ? x : h.width - 1);
+                q[at] = q[from];
+                block->flags[at] = block->flags[from];
+                continue;
+            }
+            int64_t p = x ? q[at - 1] : y ? q[at - n] : 0;
+            if (x && y) {
+                const int64_t above = q[at - n], left = q[at - n - 1],
+                              right = x == h.width - 1 ? above : q[at - n + 1];
+                const int64_t sum = (int32_t)(uint32_t)(2 * above - 3 * left + right);
+                p += (sum - (sum % 4 + 4) % 4) / 4;
+            }
+            const size_t i = (size_t)(y * h.width + x);
+            q[at] = (int32_t)((uint32_t)p + unzigzag(plane_value(payload, stored, h.height_planes, i)));
+            block->flags[at] = h.all_void ? 0 : h.has_voids ? bits[i / 8] >> i % 8 & 1 : RQT_VALID;
+        }
+    if (h.has_voids) bits += (stored + 7) / 8;
+    if (h.has_outline)
+        for (size_t i = 0; i < count; i++)
+            if (bits[i / 8] >> i % 8 & 1) block->flags[i] |= RQT_OUTLINE;
+    size_t next = 0;
+#define NEXT() plane_value(errors_at, count, h.error_planes, next++)
+    for (int step = 1; step < n - 1; step *= 2) {
+        for (int y = 0; y < n; y += step)
+            for (int x = y / step % 2 ? 0 : step; x < n; x += 2 * step)
+                reference_code(&h, q, block->error, x, y, step, false, NEXT());
+        for (int y = step; y < n; y += 2 * step)
+            for (int x = step; x < n; x += 2 * step) reference_code(&h, q, block->error, x, y, step, true, NEXT());
+    }
+    for (int c = 0; c < 4; c++)
+        block->error[(c / 2 ? (n - 1) * n : 0) + (c % 2 ? n - 1 : 0)] = (rqt_code)unzigzag(NEXT());
+    assert_int_equal(next, count);
+    block->width = h.width;
+    block->height = h.height;
+    free(payload);
+}
+
+static void the_bytes_of_a_block_mean_what_the_format_says(void **state) {
+    (void)state;
+    random_begin(__func__);
+    static const double quanta[] = {1, 0.1, 0.3048, 1e-40};
+    rqt_codec *codec = new_codec();
+    for (int k = 0; k <= RQT_MAX_BLOCK_K; k++) {
+        const int n = side_of(k);
+        rqt_block block = new_block(k), back = new_block(k), ours = new_block(k);
+        for (terrain what = FLAT; what < KINDS; what++)
+            for (int round = 0; round < 4; round++) {
+                fill(&block, round < 2 ? n : 1 + (int)random_below((uint32_t)n), round < 3 ? n : (n + 1) / 2, what,
+                     round ? 5 : 0, round % 2 ? LIKELY_ERRORS : ANY_ERRORS, 9);
+                bytes b = encode(codec, &block, quanta[round]);
+                reference_decode(b, &back);
+                assert_same_block(&block, &back);
+                /* under the voids too */
+                assert_int_equal(rqt_block_decode(codec, b.data, b.size, &ours), RQT_OK);
+                assert_memory_equal(ours.q, back.q, count_of(k) * sizeof *ours.q);
+                free(b.data);
+            }
+        rqt_block_free(&ours, &allocator);
+        rqt_block_free(&back, &allocator);
+        rqt_block_free(&block, &allocator);
+    }
+    rqt_codec_free(codec);
+}
+
 /* -------------------------------------------------------------------------------------------- damage -- */
 
 /* decode and check must say RQT_CORRUPT, and check a sentence; info RQT_CORRUPT, or RQT_OK where only the checksum
@@ -519,44 +651,42 @@ static void a_header_that_lies_is_found_out_under_a_good_checksum(void **state) 
         size_t at;
         int bytes;
         uint32_t value;
-    } lies[] = {
-        {0, 1, 'r'},
-        {AT_VERSION, 1, 0},
-        {AT_VERSION, 1, 2},
-        {AT_K, 1, 9},
-        {AT_K, 1, 255},
-        {AT_K, 1, 3},
-        {AT_K, 1, 5},
-        {AT_FLAGS, 1, 0},
-        {AT_FLAGS, 1, 3},
-        {AT_FLAGS, 1, 2},
-        {AT_FLAGS, 1, 13},
-        {AT_FLAGS, 1, 7},
-        {AT_FLAGS, 1, 69},
-        {AT_PLANES, 1, 0x25},
-        {AT_PLANES, 1, 0x32},
-        {AT_PLANES, 1, 0xF2},
-        {AT_PLANES, 1, 0x23},
-        {AT_PLANES, 1, 0x12},
-        {AT_WIDTH, 2, 0},
-        {AT_WIDTH, 2, 18},
-        {AT_WIDTH, 2, 13},
-        {AT_WIDTH, 2, 65535},
-        {AT_WIDTH, 2, 11},
-        {AT_HEIGHT, 2, 0},
-        {AT_HEIGHT, 2, 18},
-        {AT_HEIGHT, 2, 14},
-        {AT_HEIGHT, 2, 65535},
-        {AT_PAYLOAD, 4, 0},
-        {AT_PAYLOAD, 4, 1},
-        {AT_PAYLOAD, 4, 0xFFFFFFFF},
-        {AT_QUANTUM + 4, 4, 0x7FF00000},
-        {AT_QUANTUM + 4, 4, 0xFFF80000},
-        {AT_QUANTUM + 4, 4, 0xBFF00000},
-        {AT_QUANTUM + 4, 4, 0},
-        {HEADER_BYTES, 1, 0x27},
-        {HEADER_BYTES, 4, 0x184D2A50},
-    };
+    } lies[] = {{0, 1, 'r'},
+                {AT_VERSION, 1, 0},
+                {AT_VERSION, 1, 2},
+                {AT_K, 1, 9},
+                {AT_K, 1, 255},
+                {AT_K, 1, 3},
+                {AT_K, 1, 5},
+                {AT_FLAGS, 1, 0},
+                {AT_FLAGS, 1, 3},
+                {AT_FLAGS, 1, 2},
+                {AT_FLAGS, 1, 13},
+                {AT_FLAGS, 1, 7},
+                {AT_FLAGS, 1, 69},
+                {AT_PLANES, 1, 0x25},
+                {AT_PLANES, 1, 0x32},
+                {AT_PLANES, 1, 0xF2},
+                {AT_PLANES, 1, 0x23},
+                {AT_PLANES, 1, 0x12},
+                {AT_WIDTH, 2, 0},
+                {AT_WIDTH, 2, 18},
+                {AT_WIDTH, 2, 13},
+                {AT_WIDTH, 2, 65535},
+                {AT_WIDTH, 2, 11},
+                {AT_HEIGHT, 2, 0},
+                {AT_HEIGHT, 2, 18},
+                {AT_HEIGHT, 2, 14},
+                {AT_HEIGHT, 2, 65535},
+                {AT_PAYLOAD, 4, 0},
+                {AT_PAYLOAD, 4, 1},
+                {AT_PAYLOAD, 4, 0xFFFFFFFF},
+                {AT_QUANTUM + 4, 4, 0x7FF00000},
+                {AT_QUANTUM + 4, 4, 0xFFF80000},
+                {AT_QUANTUM + 4, 4, 0xBFF00000},
+                {AT_QUANTUM + 4, 4, 0},
+                {HEADER_BYTES, 1, 0x27},
+                {HEADER_BYTES, 4, 0x184D2A50}};
     for (size_t i = 0; i < sizeof lies / sizeof *lies; i++) {
         bytes lie = {copy_of(b.data, b.size), b.size};
         for (int n = 0; n < lies[i].bytes; n++)
@@ -985,47 +1115,45 @@ static void a_mesh_that_lies_is_found_out_under_a_good_checksum(void **state) {
         size_t at;
         int bytes;
         uint64_t value;
-    } lies[] = {
-        {0, 1, 'r'},
-        {4, 1, 0},
-        {4, 1, 2},
-        {5, 1, 0},
-        {5, 1, 3},
-        {6, 1, 1},
-        {7, 1, 1},
-        {112, 1, 1},
-        {127, 1, 1},
-        {16, 8, 4},
-        {16, 8, 6},
-        {24, 8, 3},
-        {24, 8, 9},
-        {16, 8, (uint64_t)1 << 62},
-        {24, 8, (uint64_t)1 << 62},
-        {16, 8, UINT64_MAX},
-        {24, 8, UINT64_MAX},
-        {16, 8, 0x1555555555555555},
-        {24, 8, ((uint64_t)1 << 62) + INDICES},
-        {32, 8, nan},
-        {40, 8, infinity},
-        {48, 8, 0},
-        {56, 8, nan},
-        {56, 8, (uint64_t)1 << 63},
-        {64, 8, (uint64_t)1 << 53},
-        {72, 4, 0},
-        {76, 4, 0},
-        {80, 4, 0},
-        {88, 8, 0},
-        {88, 8, nan},
-        {96, 8, infinity},
-        {104, 8, nan},
-        {104, 8, minus},
-        {128, 4, (1 << 20) + 1},
-        {132, 4, 0xFFFFFFFF},
-        {136, 4, 1 << 30},
-        {136, 4, 0xC0000000},
-        {INDEX, 4, VERTICES},
-        {INDEX + 20, 4, 0xFFFFFFFF},
-    };
+    } lies[] = {{0, 1, 'r'},
+                {4, 1, 0},
+                {4, 1, 2},
+                {5, 1, 0},
+                {5, 1, 3},
+                {6, 1, 1},
+                {7, 1, 1},
+                {112, 1, 1},
+                {127, 1, 1},
+                {16, 8, 4},
+                {16, 8, 6},
+                {24, 8, 3},
+                {24, 8, 9},
+                {16, 8, (uint64_t)1 << 62},
+                {24, 8, (uint64_t)1 << 62},
+                {16, 8, UINT64_MAX},
+                {24, 8, UINT64_MAX},
+                {16, 8, 0x1555555555555555},
+                {24, 8, ((uint64_t)1 << 62) + INDICES},
+                {32, 8, nan},
+                {40, 8, infinity},
+                {48, 8, 0},
+                {56, 8, nan},
+                {56, 8, (uint64_t)1 << 63},
+                {64, 8, (uint64_t)1 << 53},
+                {72, 4, 0},
+                {76, 4, 0},
+                {80, 4, 0},
+                {88, 8, 0},
+                {88, 8, nan},
+                {96, 8, infinity},
+                {104, 8, nan},
+                {104, 8, minus},
+                {128, 4, (1 << 20) + 1},
+                {132, 4, 0xFFFFFFFF},
+                {136, 4, 1 << 30},
+                {136, 4, 0xC0000000},
+                {INDEX, 4, VERTICES},
+                {INDEX + 20, 4, 0xFFFFFFFF}};
     const uint8_t *v, *i;
     for (size_t n = 0; n < sizeof lies / sizeof *lies; n++) {
         uint8_t *lie = copy_of(b.data, b.size);
@@ -1123,6 +1251,7 @@ int main(void) {
         cmocka_unit_test(any_finite_quantum_above_zero_serves),
         cmocka_unit_test(equal_blocks_give_equal_bytes_whatever_lies_under_their_voids),
         cmocka_unit_test(errors_that_their_heights_imply_take_no_plane),
+        cmocka_unit_test(the_bytes_of_a_block_mean_what_the_format_says),
         cmocka_unit_test(what_cannot_be_stored_is_refused),
         cmocka_unit_test(every_truncation_of_a_block_is_noticed),
         cmocka_unit_test(every_flipped_bit_of_a_block_is_noticed),

@@ -276,8 +276,8 @@ static void heights_are_one_double_expression(void **state) {
         u.offset = ldexp(random_unit() - 0.5, random_between(-10, 20));
         int32_t q = random_between(1 - RQT_HEIGHT_LIMIT, RQT_HEIGHT_LIMIT - 1);
         /* volatile: no fused operation, no extra precision */
-        volatile double f = u.scale * u.numerator;
-        f = f / u.denominator;
+        volatile double f = (double)u.numerator / u.denominator;
+        f = u.scale * f;
         volatile double z = q / (double)u.d;
         z = (double)u.z0 + z;
         z = z * f;

@@ -166,6 +166,68 @@ static void errors_of_long_and_narrow_rasters_are_exact(void **state) {
     check_errors_equal_oracle(raster_make(SURFACE_HILLS, 3, 200, 0));
 }
 
+/* The diamond of a triangle's split vertex is the triangle and its mirror image in the hypotenuse. */
+static void check_diamond(const oracle *o, const rqt_errors *raw, const oracle_triangle *t) {
+    const oracle_point l = t->corner[1], r = t->corner[2];
+    oracle_triangle other = *t;
+    mpq_t error, part;
+    int mixed, other_mixed = 0;
+    bool outline;
+    mpq_inits(error, part, NULL);
+    oracle_triangle_error(o, t, error, &mixed);
+    other.corner[0] = (oracle_point){l.x + r.x - t->corner[0].x, l.y + r.y - t->corner[0].y};
+    if (other.corner[0].x >= 0 && other.corner[0].y >= 0 && other.corner[0].x < o->side &&
+        other.corner[0].y < o->side)
+        oracle_triangle_error(o, &other, part, &other_mixed);
+    if (mpq_cmp(part, error) > 0) mpq_set(error, part);
+    const rqt_vertex m = {(l.x + r.x) / 2, (l.y + r.y) / 2};
+    unsigned code = rqt_errors_at(raw, m, &outline), right = oracle_code_up(error);
+    CHECK(code == right && outline == (mixed || other_mixed),
+          "%dx%d: (%d,%d) has code %u outline %d, should be %u %d", o->terrain.width, o->terrain.height, m.x, m.y,
+          code, outline, right, mixed || other_mixed);
+    mpq_clears(error, part, NULL);
+}
+
+static void check_large_raster(raster r, int descents, int first_depth) {
+    const oracle_terrain terrain = {r.width,          r.height,           r.q,      r.valid,     r.unit.scale,
+                                    r.unit.numerator, r.unit.denominator, r.unit.d, r.cost.cell, r.cost.c};
+    oracle o;
+    rqt_errors raw;
+    rqt_grid grid = {.q = r.q, .valid = r.valid};
+    oracle_create_bare(&o, &terrain);
+    assert_int_equal(rqt_lattice_init(&grid.lattice, r.width, r.height), RQT_OK);
+    assert_int_equal(rqt_errors_compute(&grid, &r.unit, &r.cost, &test_allocator, NULL, NULL, &raw), RQT_OK);
+    int s = o.side - 1;
+    for (int n = 0; n < descents; n++) {
+        oracle_triangle t = {{{s, 0}, {0, 0}, {s, s}}, 0};
+        if (random_between(0, 1)) t = (oracle_triangle){{{0, s}, {s, s}, {0, 0}}, 0};
+        for (; t.depth < 2 * o.K; t.depth++) {
+            if (n == 0 || t.depth >= first_depth) check_diamond(&o, &raw, &t);
+            const oracle_point m = {(t.corner[1].x + t.corner[2].x) / 2, (t.corner[1].y + t.corner[2].y) / 2};
+            const oracle_triangle child[2] = {{{m, t.corner[0], t.corner[1]}, t.depth},
+                                              {{m, t.corner[2], t.corner[0]}, t.depth}};
+            int which = random_between(0, 1);
+            t = child[oracle_area(&o, &child[which]) != 0 ? which : !which]; /* stay over the raster */
+        }
+    }
+    rqt_errors_free(&raw, &test_allocator);
+    oracle_free(&o);
+    raster_free(&r);
+}
+
+static void errors_of_rasters_beyond_the_oracles_lattice_are_exact_where_we_look(void **state) {
+    (void)state;
+    random_begin("large");
+    /* sums of 2^31 times the square of a leg need more than 64 bits only where legs are long */
+    check_large_raster(raster_make(SURFACE_EXTREMES, 40000, 2, -1), 8, 0);
+    check_large_raster(raster_make(SURFACE_EXTREMES, 3, 33000, -1), 6, 0);
+    check_large_raster(raster_make(SURFACE_HILLS, 20000, 3, 0), 6, 0);
+    check_large_raster(raster_make(SURFACE_EXTREMES, 513, 513, -1), 40, 5);
+    raster r = raster_make(SURFACE_HILLS, 700, 450, -1);
+    raster_add_lake(&r);
+    check_large_raster(r, 40, 5);
+}
+
 static void a_plane_has_no_error_anywhere(void **state) {
     (void)state;
     random_begin("plane");
@@ -397,6 +459,7 @@ int main(void) {
         TEST(errors_equal_the_oracles_in_feet_and_in_thousandths),
         TEST(errors_past_the_last_sample_are_exact),
         TEST(errors_of_long_and_narrow_rasters_are_exact),
+        TEST(errors_of_rasters_beyond_the_oracles_lattice_are_exact_where_we_look),
         TEST(a_plane_has_no_error_anywhere),
         TEST(values_at_voids_do_not_matter),
         TEST(errors_can_be_stopped_and_leave_nothing),

@@ -574,7 +574,7 @@ static void parts_of_a_split_window_make_exactly_the_whole(void **state) {
     }
 }
 
-static void a_placement_moves_the_window_and_changes_nothing_else(void **state) {
+static void windows_are_rounded_to_units_wherever_the_terrain_lies(void **state) {
     (void)state;
     random_begin("placement");
     const rqt_placement placement = {4096, 1024, 0.5, -2};
@@ -598,6 +598,17 @@ static void a_placement_moves_the_window_and_changes_nothing_else(void **state) 
         bool meets = rqt_region_box(region, at, at + 1, at + 2, at + 3);
         assert_true(meets == rqt_region_box(other, moved_at, moved_at + 1, moved_at + 2, moved_at + 3));
         if (meets) assert_memory_equal(at, moved_at, sizeof at);
+        /* grown outward to whole samples, clamped to the raster, which it touches or misses */
+        const long last[2] = {29, 19};
+        int32_t box[4];
+        bool touches = true;
+        for (int c = 0; c < 4; c++) {
+            long out = (r[c] + 4 * ORACLE_UNITS + (c < 2 ? 0 : ORACLE_UNITS - 1)) / ORACLE_UNITS - 4;
+            box[c] = (int32_t)(out < 0 ? 0 : out > last[c % 2] ? last[c % 2] : out);
+            touches = touches && (c < 2 ? r[c] <= last[c] * ORACLE_UNITS : r[c] >= 0);
+        }
+        assert_int_equal(meets, touches);
+        if (meets) assert_memory_equal(at, box, sizeof at);
         for (int t = 0; t < 200; t++) {
             rqt_vertex v[3];
             for (int c = 0; c < 3; c++) v[c] = (rqt_vertex){random_between(0, 29), random_between(0, 19)};
@@ -666,7 +677,7 @@ int main(void) {
         TEST(a_plane_at_eps_0_is_two_triangles),
         TEST(no_valid_sample_is_further_than_eps_and_exact_outlines_are_exact),
         TEST(parts_of_a_split_window_make_exactly_the_whole),
-        TEST(a_placement_moves_the_window_and_changes_nothing_else),
+        TEST(windows_are_rounded_to_units_wherever_the_terrain_lies),
         TEST(unreadable_blocks_and_interrupts_stop_a_query),
     };
     return cmocka_run_group_tests_name("blocks and queries", tests, NULL, NULL);

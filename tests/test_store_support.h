@@ -19,9 +19,9 @@
 #include <math.h>
 #include <unistd.h>
 
-#include "internal.h"
+#include "../src/store/internal.h"
 
-#include "../core/internal.h"
+#include "../src/core/internal.h"
 
 #define CHECK(condition, ...)                                                                                      \
     do {                                                                                                           \
@@ -198,7 +198,7 @@ static inline int write_terrain(sqlite3 *db, const raster *r, const char *name, 
     return code;
 }
 
-/* A terrain of noise in a transaction of its own. */
+/* A terrain of noise in a transaction of its own, instead of one that has the name. */
 static inline void put_terrain(sqlite3 *db, const char *name, int width, int height, int k, uint32_t seed,
                                bool voids) {
     raster r = make_raster(width, height, seed, voids);

@@ -14,7 +14,7 @@
 bool rqt_unit_is_valid(const rqt_unit *unit) {
     return unit->d >= 1 && unit->d <= 1 << 20 && unit->numerator > 0 && unit->numerator <= 1 << 20 &&
            unit->denominator > 0 && unit->denominator <= 1 << 20 && isfinite(unit->scale) && unit->scale != 0 &&
-           fabs(unit->scale) <= 1e30 && fabs(unit->scale) >= 1e-30 && isfinite(unit->offset) &&
+           isfinite(unit->offset) &&
            unit->z0 < (INT64_C(1) << 53) && unit->z0 > -(INT64_C(1) << 53);
 }
 
@@ -140,13 +140,16 @@ static rqt_code decide(wide top, int exponent, wide bottom, double near) {
 rqt_code rqt_code_from_quanta(const rqt_unit *unit, uint64_t numerator_high, uint64_t numerator_low,
                               uint64_t denominator) {
     if (numerator_high == 0 && numerator_low == 0) return 0;
-    const double near = (ldexp((double)numerator_high, 64) + (double)numerator_low) / (double)denominator *
-                        fabs(rqt_unit_factor(unit)) / (double)unit->d;
-    if (near >= 0x1p249) return RQT_CODE_LARGEST;
-    if (near < 0x1p-257) return 1;
     int exponent;
+    const uint64_t mantissa = take_apart(fabs(unit->scale), &exponent);
+    /* The mantissa alone, then its exponent: no step overflows that the result does not. */
+    const double near = ldexp((ldexp((double)numerator_high, 64) + (double)numerator_low) / (double)denominator *
+                                  (double)mantissa * unit->numerator / unit->denominator / unit->d,
+                              exponent);
+    if (near >= 0x1p256) return RQT_CODE_LARGEST;
+    if (near < 0x1p-257) return 1;
     wide top = wide_of(numerator_high, numerator_low);
-    wide_multiply(&top, take_apart(fabs(unit->scale), &exponent));
+    wide_multiply(&top, mantissa);
     wide_multiply(&top, (uint64_t)unit->numerator);
     wide bottom = wide_of(0, denominator);
     wide_multiply(&bottom, (uint64_t)unit->d);
@@ -156,13 +159,15 @@ rqt_code rqt_code_from_quanta(const rqt_unit *unit, uint64_t numerator_high, uin
 
 rqt_code rqt_code_from_ground(int64_t extent, double cell, double c) {
     if (extent <= 0) return 0;
-    const double near = (double)extent * cell / c;
-    if (near >= 0x1p249) return RQT_CODE_LARGEST;
-    if (near < 0x1p-257) return 1;
     int cell_exponent, c_exponent;
+    const uint64_t cell_mantissa = take_apart(cell, &cell_exponent), c_mantissa = take_apart(c, &c_exponent);
+    const double near =
+        ldexp((double)extent * (double)cell_mantissa / (double)c_mantissa, cell_exponent - c_exponent);
+    if (near >= 0x1p256) return RQT_CODE_LARGEST;
+    if (near < 0x1p-257) return 1;
     wide top = wide_of(0, (uint64_t)extent);
-    wide_multiply(&top, take_apart(cell, &cell_exponent));
-    wide bottom = wide_of(0, take_apart(c, &c_exponent));
+    wide_multiply(&top, cell_mantissa);
+    wide bottom = wide_of(0, c_mantissa);
     return decide(top, cell_exponent - c_exponent, bottom, near);
 }
 

@@ -92,8 +92,8 @@ int rqt_vertex_children(const rqt_lattice *lattice, rqt_vertex v, rqt_vertex chi
 rqt_vertex rqt_vertex_clamp(const rqt_lattice *lattice, rqt_vertex v);
 
 /* ----------------------------------------------------------------------------------- units and codes --
- * Metres of a height q: ((double)z0 + q / (double)d) * f + o, with f = scale * numerator / denominator.
- * One double expression, evaluated in that order, never fused. */
+ * Metres of a height q: ((double)z0 + q / (double)d) * f + o, with
+ * f = scale * (numerator / denominator). One double expression, evaluated in that order, never fused. */
 typedef struct rqt_unit {
     int64_t z0;                     /* |z0| < 2^53 */
     int32_t d;                      /* quanta in one unit, 1 .. 2^20 */

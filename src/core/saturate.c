@@ -85,7 +85,6 @@ void rqt_errors_saturate(rqt_errors *errors) {
         const int32_t q = 1 << scale;
         const int64_t end = (int64_t)lattice->height + 6 * (int64_t)q;
         for (int64_t y = q; y <= f.side && y < end; y += 2 * q) pull_row(&f, (int32_t)y, q, 2 * q, q, false);
-        if (scale + 1 == lattice->K) break; /* what follows are the corners */
         const int64_t far_end = (int64_t)lattice->height + 12 * (int64_t)q;
         for (int64_t y = 0; y <= f.side && y < far_end; y += 2 * q) {
             const bool odd = (y / (2 * q)) & 1;

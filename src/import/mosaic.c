@@ -47,7 +47,7 @@ static bool place(const import_job *job, const import_source *sources, int count
         if (!s->placed || !first->placed)
             return import_refuse(job, "%s has no geotransform: it cannot be placed beside %s",
                                  s->placed ? first->path : s->path, s->placed ? s->path : first->path);
-        int64_t x, y;
+        int64_t x = 0, y = 0;
         if (!align(job, first, s, false, &x) || !align(job, first, s, true, &y)) return false;
         m->column[i] = (int32_t)x;
         m->row[i] = (int32_t)y;

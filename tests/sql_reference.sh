@@ -1,0 +1,21 @@
+#!/bin/bash
+# sql_reference.sh BUILD - the SQL reference as Markdown, from rqt_help.
+cat <<'HEAD'
+# SQL reference
+
+Written by `make docs` from the table in `ext/functions.c`; the same rows as `SELECT * FROM rqt_help`. Every example runs in the
+database that `make demo` makes, and in the tests.
+
+**Region**: NULL (all), WKT or EWKT text, a GeoPackage or SpatiaLite geometry. Without an SRID it is in the terrain's CRS. **eps**:
+metres, 0 or more; 0 is lossless, 9e999 the coarsest. **terrain**: a name; NULL or left out: the only one. **options**: a JSON
+object; this version knows `mode` cover, `outline` exact, `metric` exact, `select` threshold, topdown or bottomup (the same
+mesh three ways), `strip` bintree.
+
+A query answers with every triangle of the terrain's mesh at eps whose interior meets the interior of the region; for lines
+and points, every triangle that they touch. Triangles of any two answers at one eps are equal or disjoint.
+HEAD
+sqlite3 :memory: -cmd ".load $1/rqt.so" "
+SELECT char(10) || '## ' || name || '(' || arguments || ')' || char(10) || char(10) ||
+       CASE kind WHEN 'table' THEN 'Columns: ' ELSE 'Gives: ' END || returns || '. ' || purpose || char(10) || char(10) ||
+       '    ' || example || ';'
+FROM rqt_help"
