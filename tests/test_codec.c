@@ -500,7 +500,7 @@ static void reference_decode(bytes b, rqt_block *block) {
             }
             const size_t i = (size_t)(y * h.width + x);
             q[at] = (int32_t)((uint32_t)p + unzigzag(plane_value(payload, stored, h.height_planes, i)));
-            block->flags[at] = h.all_void ? 0 : h.has_voids ? bits[i / 8] >> i % 8 & 1 : RQT_VALID;
+            block->flags[at] = (uint8_t)(h.has_voids ? bits[i / 8] >> i % 8 & 1 : !h.all_void);
         }
     if (h.has_voids) bits += (stored + 7) / 8;
     if (h.has_outline)

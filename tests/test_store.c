@@ -13,7 +13,7 @@ static void sound_terrains_have_no_findings(void **state) {
     (void)state;
     static const struct {
         int width, height, k;
-    } sizes[] = {{1, 1, 0}, {2, 2, 0},   {1, 5, 1},   {5, 1, 2},  {18, 7, 1}, {18, 7, 3}, {65, 65, 4},
+    } sizes[] = {{1, 1, 0},   {2, 2, 0},    {1, 5, 1},    {5, 1, 2},   {18, 7, 1},  {18, 7, 3}, {65, 65, 4},
                  {65, 65, 6}, {100, 40, 3}, {33, 129, 2}, {40, 33, 2}, {17, 66, 1}, {3, 64, 2}};
     for (size_t n = 0; n < sizeof sizes / sizeof *sizes; n++)
         for (int voids = 0; voids < 2; voids++) {
@@ -27,35 +27,91 @@ static void sound_terrains_have_no_findings(void **state) {
         }
 }
 
-static void height_of_parent(rqt_block *b) { b->q[CENTER]++; }
-static void height_of_east(rqt_block *b) { b->q[EAST]++; }
-static void height_of_south(rqt_block *b) { b->q[SOUTH]++; }
-static void height_inside(rqt_block *b) { b->q[FINE] += 1000; }
-static void error_of_parent(rqt_block *b) { b->error[CENTER]++; }
-static void error_of_east(rqt_block *b) { b->error[EAST]++; }
-static void error_too_small(rqt_block *b) { b->error[FINE] = 0; }
-static void error_unsaturated(rqt_block *b) { b->error[CENTER] = 1; }
-static void error_too_large(rqt_block *b) { b->error[FINE] = 60000; }
-static void error_infinite(rqt_block *b) { b->error[FINE] = RQT_CODE_INFINITY; }
-static void error_of_root_corner(rqt_block *b) { b->error[0] = RQT_CODE_LARGEST; }
-static void outline_of_parent(rqt_block *b) { b->flags[CENTER] ^= RQT_OUTLINE; }
-static void outline_of_east(rqt_block *b) { b->flags[EAST] ^= RQT_OUTLINE; }
-static void outline_unsaturated(rqt_block *b) { b->flags[FINE] |= RQT_OUTLINE; }
-static void void_without_outline(rqt_block *b) { b->flags[FINE] = 0; }
-static void narrower(rqt_block *b) { b->width = 3; }
+static void height_of_parent(rqt_block *b) {
+    b->q[CENTER]++;
+}
+static void height_of_east(rqt_block *b) {
+    b->q[EAST]++;
+}
+static void height_of_south(rqt_block *b) {
+    b->q[SOUTH]++;
+}
+static void height_inside(rqt_block *b) {
+    b->q[FINE] += 1000;
+}
+static void error_of_parent(rqt_block *b) {
+    b->error[CENTER]++;
+}
+static void error_of_east(rqt_block *b) {
+    b->error[EAST]++;
+}
+static void error_too_small(rqt_block *b) {
+    b->error[FINE] = 0;
+}
+static void error_unsaturated(rqt_block *b) {
+    b->error[CENTER] = 1;
+}
+static void error_too_large(rqt_block *b) {
+    b->error[FINE] = 60000;
+}
+static void error_infinite(rqt_block *b) {
+    b->error[FINE] = RQT_CODE_INFINITY;
+}
+static void error_of_root_corner(rqt_block *b) {
+    b->error[0] = RQT_CODE_LARGEST;
+}
+static void outline_of_parent(rqt_block *b) {
+    b->flags[CENTER] ^= RQT_OUTLINE;
+}
+static void outline_of_east(rqt_block *b) {
+    b->flags[EAST] ^= RQT_OUTLINE;
+}
+static void outline_unsaturated(rqt_block *b) {
+    b->flags[FINE] |= RQT_OUTLINE;
+}
+static void void_without_outline(rqt_block *b) {
+    b->flags[FINE] = 0;
+}
+static void narrower(rqt_block *b) {
+    b->width = 3;
+}
 
-static void em_tol(rqt_summary *s) { s->tol.em++; }
-static void em_exact(rqt_summary *s) { s->exact.em++; }
-static void em_parent_tol(rqt_summary *s) { s->tol.em_parent--; }
-static void em_parent_exact(rqt_summary *s) { s->exact.em_parent--; }
-static void center_error(rqt_summary *s) { s->center_error ^= 1; }
-static void center_flags(rqt_summary *s) { s->center_flags ^= RQT_OUTLINE; }
-static void corner_height(rqt_summary *s) { s->corner[1].q++; }
-static void corner_error(rqt_summary *s) { s->corner[2].error++; }
-static void corner_flags(rqt_summary *s) { s->corner[3].flags ^= RQT_OUTLINE; }
-static void far_height(rqt_summary *s) { s->far[0].q++; }
-static void far_error(rqt_summary *s) { s->far[1].error ^= 1; }
-static void far_flags(rqt_summary *s) { s->far[1].flags ^= RQT_OUTLINE; }
+static void em_tol(rqt_summary *s) {
+    s->tol.em++;
+}
+static void em_exact(rqt_summary *s) {
+    s->exact.em++;
+}
+static void em_parent_tol(rqt_summary *s) {
+    s->tol.em_parent--;
+}
+static void em_parent_exact(rqt_summary *s) {
+    s->exact.em_parent--;
+}
+static void center_error(rqt_summary *s) {
+    s->center_error ^= 1;
+}
+static void center_flags(rqt_summary *s) {
+    s->center_flags ^= RQT_OUTLINE;
+}
+static void corner_height(rqt_summary *s) {
+    s->corner[1].q++;
+}
+static void corner_error(rqt_summary *s) {
+    s->corner[2].error++;
+}
+static void corner_flags(rqt_summary *s) {
+    s->corner[3].flags ^= RQT_OUTLINE;
+}
+static void far_height(rqt_summary *s) {
+    s->far[0].q++;
+}
+static void far_error(rqt_summary *s) {
+    s->far[1].error ^= 1;
+}
+static void far_flags(rqt_summary *s) {
+    s->far[1].flags ^= RQT_OUTLINE;
+}
 
 typedef struct damage {
     rqt_block_number number; /* which block is damaged; 0 with SQL */
@@ -67,9 +123,12 @@ typedef struct damage {
     double quantum; /* 0: the terrain's */
 } damage;
 
-#define BLOCK(number, edit, told, says) {number, edit, NULL, NULL, told, says, 0}
-#define SUMMARY(number, edit, told, says) {number, NULL, edit, NULL, told, says, 0}
-#define SQL(statement, told, says) {0, NULL, NULL, statement, told, says, 0}
+#define BLOCK(number, edit, told, says) \
+    { number, edit, NULL, NULL, told, says, 0 }
+#define SUMMARY(number, edit, told, says) \
+    { number, NULL, edit, NULL, told, says, 0 }
+#define SQL(statement, told, says) \
+    { 0, NULL, NULL, statement, told, says, 0 }
 
 static const damage damages[] = {
     BLOCK(268, height_of_parent, 268, "its parent, block 67, about the height at (10,10)"),
@@ -79,7 +138,8 @@ static const damage damages[] = {
     BLOCK(268, error_of_parent, 268, "its parent, block 67, about the error"),
     BLOCK(268, error_of_east, 268, "its eastern neighbour, block 269, about the error"),
     BLOCK(268, error_too_small, 268, "an error smaller than what its vertex itself is off: at (9,9)"),
-    BLOCK(268, error_unsaturated, 268, "a vertex with less error or outline than one that depends on it: at (10,10)"),
+    BLOCK(268, error_unsaturated, 268,
+          "a vertex with less error or outline than one that depends on it: at (10,10)"),
     BLOCK(268, error_too_large, 268, "a vertex with less error or outline"),
     BLOCK(268, error_too_large, 67, "has em "),
     BLOCK(268, error_too_large, 0, "has max_error "),
@@ -135,7 +195,8 @@ static const damage damages[] = {
     SQL("DELETE FROM rqt_index_1 WHERE id = 268", 268, "is missing in the index"),
     SQL("UPDATE rqt_index_1 SET x1 = x1 + 1 WHERE id = 268", 268, "another extent in the index"),
     SQL("UPDATE rqt_index_1 SET y0 = y0 - 1 WHERE id = 67", 67, "another extent in the index"),
-    SQL("UPDATE rqt_index_1 SET tol1 = tol1 + 1 WHERE id = 268", 268, "another interval of outline tol in the index"),
+    SQL("UPDATE rqt_index_1 SET tol1 = tol1 + 1 WHERE id = 268", 268,
+        "another interval of outline tol in the index"),
     SQL("UPDATE rqt_index_1 SET exact0 = exact0 - 1 WHERE id = 67", 67,
         "another interval of outline exact in the index"),
     SQL("INSERT INTO rqt_index_1 VALUES(5000, 0, 4, 0, 4, 0, 1, 0, 1)", 5000, "has a row in the index, but"),
@@ -290,7 +351,8 @@ static void a_terrain_is_found_by_name_or_the_sentence_says_what_there_is(void *
     expect_find(s, "d", NULL, NULL, "terrain d is in 2 databases; say which as database.d");
     run(db, "DETACH \"so\"\"uth\"");
     expect_find(s, "d", "north", "d", NULL);
-    const answer near = query_store(s, "a", 0, by_threshold, NULL), far = query_store(s, "north.a", 0, by_threshold, NULL);
+    const answer near = query_store(s, "a", 0, by_threshold, NULL),
+                 far = query_store(s, "north.a", 0, by_threshold, NULL);
     assert_int_equal(near.code, SQLITE_OK);
     assert_int_equal(far.code, SQLITE_OK);
     assert_true(near.hash != far.hash);
@@ -341,13 +403,22 @@ static void a_window_is_the_raster(void **state) {
                         if (valid[i]) assert_int_equal(q[i], r.q[at]);
                     }
                 }
-        static const int wrong[][4] = {{-1, 0, 1, 1}, {0, -1, 1, 1}, {0, 0, 0, 1}, {0, 0, 1, 0}, {0, 0, 41, 1},
-                                       {0, 0, 1, 34}, {40, 0, 1, 1}, {0, 33, 1, 1}, {1, 1, INT32_MAX, INT32_MAX},
-                                       {INT32_MAX, INT32_MAX, 1, 1}, {INT32_MIN, 0, 1, 1}};
+        static const int wrong[][4] = {{-1, 0, 1, 1},
+                                       {0, -1, 1, 1},
+                                       {0, 0, 0, 1},
+                                       {0, 0, 1, 0},
+                                       {0, 0, 41, 1},
+                                       {0, 0, 1, 34},
+                                       {40, 0, 1, 1},
+                                       {0, 33, 1, 1},
+                                       {1, 1, INT32_MAX, INT32_MAX},
+                                       {INT32_MAX, INT32_MAX, 1, 1},
+                                       {INT32_MIN, 0, 1, 1}};
         for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
             char *error = NULL;
-            assert_int_equal(store_window(s, t, wrong[i][0], wrong[i][1], wrong[i][2], wrong[i][3], q, valid, &error),
-                             SQLITE_ERROR);
+            assert_int_equal(
+                store_window(s, t, wrong[i][0], wrong[i][1], wrong[i][2], wrong[i][3], q, valid, &error),
+                SQLITE_ERROR);
             assert_non_null(error);
             sqlite3_free(error);
         }
@@ -390,7 +461,8 @@ static void check_half_cells(const probe *p, double fx, double fy) {
             const bool upper = main_diagonal ? fx > fy : fx + fy < 1;
             const int ax = main_diagonal ? x + upper : x + !upper, ay = main_diagonal ? y + !upper : y + !upper;
             const int px = main_diagonal ? ax : 2 * x + 1 - ax, qy = main_diagonal ? ay : 2 * y + 1 - ay;
-            const int across[2] = {main_diagonal ? 2 * x + 1 - ax : px, ay}, down[2] = {ax, main_diagonal ? 2 * y + 1 - ay : qy};
+            const int across[2] = {main_diagonal ? 2 * x + 1 - ax : px, ay},
+                      down[2] = {ax, main_diagonal ? 2 * y + 1 - ay : qy};
             memcpy(corners, (int[3][2]){{ax, ay}, {across[0], across[1]}, {down[0], down[1]}}, sizeof corners);
             double got, wanted = 0;
             const bool found = height_at(p, x + fx, y + fy, -1, &got);
@@ -437,7 +509,8 @@ static void heights_are_the_planes_of_the_full_raster_or_of_the_mesh(void **stat
             }
             if (height_at(&p, x, y, 0, &mesh)) assert_true(fabs(mesh - metres_of(&p, x, y)) < 1e-9);
         }
-        static const double outside[][2] = {{-0.01, 5}, {17.01, 5}, {5, -0.01}, {5, 10.01}, {1e300, 0}, {0, -1e300}};
+        static const double outside[][2] = {{-0.01, 5}, {17.01, 5}, {5, -0.01},
+                                            {5, 10.01}, {1e300, 0}, {0, -1e300}};
         for (int i = 0; i < 6; i++) {
             assert_false(height_at(&p, outside[i][0], outside[i][1], -1, &metres));
             assert_false(height_at(&p, outside[i][0], outside[i][1], 1, &metres));
@@ -467,7 +540,8 @@ static void rasters_of_one_row_or_column_have_heights_and_no_mesh(void **state) 
         for (int i = 0; i < 9; i++) {
             const double at = 0.5 * i;
             assert_true(height_at(&p, tall ? 0 : at, tall ? at : 0, -1, &metres));
-            const double wanted = (rqt_unit_metres(&test_unit, r.q[i / 2]) + rqt_unit_metres(&test_unit, r.q[(i + 1) / 2])) / 2;
+            const double wanted =
+                (rqt_unit_metres(&test_unit, r.q[i / 2]) + rqt_unit_metres(&test_unit, r.q[(i + 1) / 2])) / 2;
             CHECK(fabs(metres - wanted) < 1e-9, "%d x %d at %g: %g instead of %g", w, h, at, metres, wanted);
             assert_false(height_at(&p, tall ? 0 : at, tall ? at : 0, 0, &metres));
         }
@@ -502,7 +576,8 @@ static void every_way_of_selecting_gives_one_mesh_and_reads_tell_which_blocks(vo
             }
             for (size_t i = 0; i < reads.count; i++) {
                 assert_int_equal(reads.rows[i].needs_bytes, reads.rows[i].bytes > 0);
-                char *sql = sqlite3_mprintf("SELECT length(data) FROM rqt_block_1 WHERE id = %llu", reads.rows[i].number);
+                char *sql =
+                    sqlite3_mprintf("SELECT length(data) FROM rqt_block_1 WHERE id = %llu", reads.rows[i].number);
                 if (reads.rows[i].needs_bytes) assert_int_equal(reads.rows[i].bytes, atoll(ask(db, sql)));
                 sqlite3_free(sql);
             }
@@ -551,8 +626,14 @@ static void a_block_answered_by_its_index_row_is_not_read(void **state) {
 
 static void names_are_plain(void **state) {
     (void)state;
-    static const char *const good[] = {"a", "A-b_c.9", "123456789012345678901234567890123456789012345678901234567890123"};
-    static const char *const bad[] = {"", "a b", "a/b", "\xc3\xa4", "a'b", "a\nb",
+    static const char *const good[] = {"a", "A-b_c.9",
+                                       "123456789012345678901234567890123456789012345678901234567890123"};
+    static const char *const bad[] = {"",
+                                      "a b",
+                                      "a/b",
+                                      "\xc3\xa4",
+                                      "a'b",
+                                      "a\nb",
                                       "1234567890123456789012345678901234567890123456789012345678901234"};
     for (size_t i = 0; i < sizeof good / sizeof *good; i++) assert_true(store_name_is_valid(good[i]));
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) assert_false(store_name_is_valid(bad[i]));
@@ -579,7 +660,8 @@ static void replacing_leaves_nothing_of_the_old_terrain(void **state) {
     sqlite3_free(error);
     raster_free(&r);
     put_terrain(db, "t", 18, 7, 2, 2, false);
-    assert_string_equal(ask(db, "SELECT group_concat(name || ' ' || width, ', ') FROM rqt_terrain"), "other 5, t 18");
+    assert_string_equal(ask(db, "SELECT group_concat(name || ' ' || width, ', ') FROM rqt_terrain"),
+                        "other 5, t 18");
     /* ids are not used again: what was kept for the old one cannot meet the new one */
     assert_string_equal(ask(db, "SELECT group_concat(name, ' ') FROM (SELECT name FROM sqlite_schema "
                                 "WHERE name GLOB 'rqt_block_*' OR name GLOB 'rqt_index_*' ORDER BY name)"),
@@ -601,11 +683,14 @@ static void a_geopackage_has_its_tables_and_lists_ours(void **state) {
     put_terrain(db, "alps", 18, 7, 2, 1, false);
     assert_string_equal(ask(db, "PRAGMA application_id"), "1196444487");
     assert_string_equal(ask(db, "PRAGMA user_version"), "10300");
-    assert_string_equal(ask(db, "SELECT group_concat(srs_id) FROM (SELECT srs_id FROM gpkg_spatial_ref_sys ORDER BY 1)"),
-                        "-1,0,4326");
-    assert_string_equal(ask(db, "SELECT data_type || ': ' || description FROM gpkg_contents WHERE table_name = 'rqt_block_1'"),
-                        "attributes: rqt: blocks of terrain alps, 18 x 7 samples");
-    assert_string_equal(ask(db, "SELECT data_type FROM gpkg_contents WHERE table_name = 'rqt_terrain'"), "attributes");
+    assert_string_equal(
+        ask(db, "SELECT group_concat(srs_id) FROM (SELECT srs_id FROM gpkg_spatial_ref_sys ORDER BY 1)"),
+        "-1,0,4326");
+    assert_string_equal(
+        ask(db, "SELECT data_type || ': ' || description FROM gpkg_contents WHERE table_name = 'rqt_block_1'"),
+        "attributes: rqt: blocks of terrain alps, 18 x 7 samples");
+    assert_string_equal(ask(db, "SELECT data_type FROM gpkg_contents WHERE table_name = 'rqt_terrain'"),
+                        "attributes");
     assert_string_equal(ask(db, "PRAGMA integrity_check"), "ok");
     assert_string_equal(ask(db, "PRAGMA foreign_key_check"), "");
     sqlite3_close(db);

@@ -1,5 +1,6 @@
-/* test_store_support.h - what the test programs of the store share: terrains made in memory through the core and the
- * writer, findings as a list, and tools that damage a stored terrain in a chosen place and leave its checksums right.
+/* test_store_support.h - what the test programs of the store share: terrains made in memory through the core and
+ * the writer, findings as a list, and tools that damage a stored terrain in a chosen place and leave its checksums
+ * right.
  *
  * Terrains are small and rough: hash noise on a slope, so that every vertex has an error and a lost or stale block
  * changes an answer. */
@@ -23,12 +24,12 @@
 
 #include "../src/core/internal.h"
 
-#define CHECK(condition, ...)                                                                                      \
-    do {                                                                                                           \
-        if (!(condition)) {                                                                                        \
-            print_error("failed: %s\n", #condition);                                                               \
-            fail_msg(__VA_ARGS__);                                                                                 \
-        }                                                                                                          \
+#define CHECK(condition, ...)                        \
+    do {                                             \
+        if (!(condition)) {                          \
+            print_error("failed: %s\n", #condition); \
+            fail_msg(__VA_ARGS__);                   \
+        }                                            \
     } while (0)
 
 /* ------------------------------------------------------------------------------------------------- SQL */
@@ -157,7 +158,8 @@ static inline store_terrain describe(const raster *r, const char *name, int k) {
     return t;
 }
 
-/* The whole of a terrain, in a transaction that is begun. With anything but SQLITE_OK *error may hold a sentence. */
+/* The whole of a terrain, in a transaction that is begun. With anything but SQLITE_OK *error may hold a sentence.
+ */
 static inline int write_terrain(sqlite3 *db, const raster *r, const char *name, int k, bool replace, bool finish,
                                 char **error) {
     const rqt_allocator *allocator = store_allocator();

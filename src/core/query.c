@@ -40,7 +40,8 @@ typedef struct walk {
     int n;                  /* vertices a side */
     uint8_t *chosen;        /* n * n: selected? */
     uint32_t *memo;         /* n * n: index in the patch, or NONE */
-    rqt_status status;
+    bool clamped;           /* some of its vertices are past the last sample */
+    bool plain;             /* not clamped, and without voids */
 } walk;
 
 /* ----------------------------------------------------------------------------------------- the patch grows */
@@ -68,32 +69,47 @@ static bool table_grow(walk *w) {
     return true;
 }
 
+/* Room for all that one block can add, so that nothing can fail while it is walked. */
+static bool reserve(walk *w) {
+    rqt_patch *patch = w->patch;
+    const size_t vertices = (size_t)w->n * (size_t)w->n + 6, triangles = 2 * (size_t)w->n * (size_t)w->n + 2,
+                 shared = 4 * (size_t)w->n + 6;
+    if (patch->vertex_count + vertices >= NONE ||
+        !memory_grow(w->allocator, (void **)&patch->vertices, &w->vertex_capacity, patch->vertex_count + vertices,
+                     sizeof *patch->vertices) ||
+        !memory_grow(w->allocator, (void **)&patch->triangles, &w->triangle_capacity,
+                     patch->triangle_count + triangles, 3 * sizeof *patch->triangles))
+        return false;
+    /* A block at the raster's edge may share more, up to all of its vertices, with its own aliases. */
+    const size_t entries = w->table_count + (w->clamped ? vertices : shared);
+    while (2 * (entries + 1) > w->table_size)
+        if (!table_grow(w)) return false;
+    return true;
+}
+
 static uint32_t append_vertex(walk *w, const corner *c, rqt_vertex sample, uint8_t level) {
     rqt_patch *patch = w->patch;
-    if (patch->vertex_count >= NONE - 1 ||
-        !memory_grow(w->allocator, (void **)&patch->vertices, &w->vertex_capacity, patch->vertex_count + 1,
-                     sizeof *patch->vertices)) {
-        w->status = RQT_NO_MEMORY;
-        return NONE;
-    }
     patch->vertices[patch->vertex_count] =
         (rqt_patch_vertex){.col = sample.x, .row = sample.y, .q = c->q, .error = c->error, .level = level};
     return (uint32_t)patch->vertex_count++;
 }
 
+/* Is this lattice vertex the only one of its sample, and of no other block? */
+static bool is_shared(const walk *w, rqt_vertex v) {
+    const rqt_block_place *p = &w->place;
+    return v.x <= p->x || v.y <= p->y || v.x >= p->x + p->side || v.y >= p->y + p->side ||
+           v.x >= w->query->lattice.width - 1 || v.y >= w->query->lattice.height - 1;
+}
+
 /* The index of a corner in the patch. Vertices inside a block occur in no other block: for them the memo is enough. */
-static uint32_t intern(walk *w, const corner *c, bool shared) {
+static uint32_t intern(walk *w, const corner *c) {
     if (c->memo && *c->memo != NONE) return *c->memo;
     const rqt_vertex sample = rqt_vertex_clamp(&w->query->lattice, c->at);
     const uint8_t level = (uint8_t)rqt_vertex_level(&w->query->lattice, c->at);
     uint32_t index = NONE;
-    if (!shared) {
+    if (!is_shared(w, c->at)) {
         index = append_vertex(w, c, sample, level);
     } else {
-        if (2 * (w->table_count + 1) > w->table_size && !table_grow(w)) {
-            w->status = RQT_NO_MEMORY;
-            return NONE;
-        }
         size_t at = table_place(sample.x, sample.y, w->table_size);
         for (; w->table[at] != NONE; at = (at + 1) & (w->table_size - 1)) {
             rqt_patch_vertex *v = &w->patch->vertices[w->table[at]];
@@ -105,20 +121,12 @@ static uint32_t intern(walk *w, const corner *c, bool shared) {
         }
         if (index == NONE) {
             index = append_vertex(w, c, sample, level);
-            if (index == NONE) return NONE;
             w->table[at] = index;
             w->table_count++;
         }
     }
     if (c->memo) *c->memo = index;
     return index;
-}
-
-/* Is this lattice vertex the only one of its sample, and of no other block? */
-static bool is_shared(const walk *w, rqt_vertex v) {
-    const rqt_block_place *p = &w->place;
-    return v.x <= p->x || v.y <= p->y || v.x >= p->x + p->side || v.y >= p->y + p->side ||
-           v.x >= w->query->lattice.width - 1 || v.y >= w->query->lattice.height - 1;
 }
 
 static bool keeps(const walk *w, const corner *a, const corner *b, const corner *c) {
@@ -128,31 +136,27 @@ static bool keeps(const walk *w, const corner *a, const corner *b, const corner 
     return !(a->at.y >= last_y && b->at.y >= last_y && c->at.y >= last_y);
 }
 
-/* A leaf. inside: the region is known to want it. */
-static void emit(walk *w, const corner *a, const corner *b, const corner *c, bool inside) {
-    if (w->status != RQT_OK || !keeps(w, a, b, c)) return;
+/* A leaf whose apex, left and right turn clockwise in (col,row): counter-clockwise from above, for rows grow south. */
+static void put_triangle(walk *w, uint32_t a, uint32_t l, uint32_t r, bool clockwise) {
+    uint32_t *out = w->patch->triangles + 3 * w->patch->triangle_count++;
+    out[0] = a;
+    out[1] = clockwise ? l : r;
+    out[2] = clockwise ? r : l;
+}
+
+/* A leaf that may be void, without area, or none of the region's. */
+static void emit(walk *w, const corner *a, const corner *l, const corner *r, bool inside) {
+    if (!keeps(w, a, l, r)) return;
     if (!inside) {
         const rqt_lattice *lattice = &w->query->lattice;
-        if (!rqt_region_meets(w->query->region, rqt_vertex_clamp(lattice, a->at), rqt_vertex_clamp(lattice, b->at),
-                              rqt_vertex_clamp(lattice, c->at)))
+        if (!rqt_region_meets(w->query->region, rqt_vertex_clamp(lattice, a->at), rqt_vertex_clamp(lattice, l->at),
+                              rqt_vertex_clamp(lattice, r->at)))
             return;
     }
-    const uint32_t i = intern(w, a, is_shared(w, a->at)), j = intern(w, b, is_shared(w, b->at)),
-                   k = intern(w, c, is_shared(w, c->at));
-    if (w->status != RQT_OK) return;
-    rqt_patch *patch = w->patch;
-    if (!memory_grow(w->allocator, (void **)&patch->triangles, &w->triangle_capacity, patch->triangle_count + 1,
-                     3 * sizeof *patch->triangles)) {
-        w->status = RQT_NO_MEMORY;
-        return;
-    }
-    /* Rows grow south, so counter-clockwise from above is clockwise in (col,row). */
-    const int64_t cross = (int64_t)(b->at.x - a->at.x) * (c->at.y - a->at.y) -
-                          (int64_t)(c->at.x - a->at.x) * (b->at.y - a->at.y);
-    uint32_t *out = patch->triangles + 3 * patch->triangle_count++;
-    out[0] = i;
-    out[1] = cross < 0 ? j : k;
-    out[2] = cross < 0 ? k : j;
+    const int64_t cross = (int64_t)(l->at.x - a->at.x) * (r->at.y - a->at.y) -
+                          (int64_t)(r->at.x - a->at.x) * (l->at.y - a->at.y);
+    const uint32_t i = intern(w, a), j = intern(w, l), k = intern(w, r);
+    put_triangle(w, i, j, k, cross < 0);
 }
 
 /* ------------------------------------------------------------------------------------------ inside a block */
@@ -162,14 +166,20 @@ static bool is_selected(const walk *w, rqt_vertex v, rqt_code error, uint8_t fla
     return error > w->query->eps || (w->query->outline == RQT_OUTLINE_EXACT && (flags & RQT_OUTLINE));
 }
 
-static corner block_corner(const walk *w, int u, int v) {
-    const size_t i = (size_t)v * (size_t)w->n + (size_t)u;
-    const int32_t stride = w->place.stride;
+/* The vertex at place i of the block's arrays. */
+static corner block_corner(const walk *w, uint32_t i) {
+    const int32_t stride = w->place.stride, u = (int32_t)i % w->n, v = (int32_t)i / w->n;
     return (corner){.at = {w->place.x + u * stride, w->place.y + v * stride},
                     .q = w->block->q[i],
                     .error = w->block->error[i],
                     .flags = w->block->flags[i],
                     .memo = &w->memo[i]};
+}
+
+static uint32_t place_index(walk *w, uint32_t i) {
+    if (w->memo[i] != NONE) return w->memo[i];
+    const corner c = block_corner(w, i);
+    return intern(w, &c);
 }
 
 static rqt_relation relation_of(const walk *w, rqt_vertex a, rqt_vertex b, rqt_vertex c) {
@@ -183,27 +193,38 @@ static rqt_relation relation_of(const walk *w, rqt_vertex a, rqt_vertex b, rqt_v
     return rqt_region_box_relation(w->query->region, x0, y0, x1, y1);
 }
 
-/* The triangle with apex (au,av) and hypotenuse from (lu,lv) to (ru,rv), in grid places of the block. */
-static void walk_triangle(walk *w, int au, int av, int lu, int lv, int ru, int rv, bool inside) {
-    if (!inside) {
-        const rqt_block_place *p = &w->place;
-        const int32_t s = p->stride;
-        const rqt_relation relation = relation_of(w, (rqt_vertex){p->x + au * s, p->y + av * s},
-                                                  (rqt_vertex){p->x + lu * s, p->y + lv * s},
-                                                  (rqt_vertex){p->x + ru * s, p->y + rv * s});
-        if (relation == RQT_OUTSIDE) return;
-        inside = relation == RQT_INSIDE;
+/* Below a triangle that the region wants as a whole, in a block without voids inside the raster: nothing is left to ask but
+ * whether the split vertex is selected. a, l, r: places in the block's arrays; the midpoint of two places is their mean.
+ * splits: how often the triangle can be split on the block's grid. */
+static void walk_plain(walk *w, uint32_t a, uint32_t l, uint32_t r, int splits, bool clockwise) {
+    const uint32_t m = (l + r) / 2;
+    if (splits > 0 && w->chosen[m]) {
+        walk_plain(w, m, l, a, splits - 1, !clockwise);
+        walk_plain(w, m, a, r, splits - 1, !clockwise);
+        return;
     }
-    if (!((lu + ru) & 1) && !((lv + rv) & 1)) {
-        const int mu = (lu + ru) / 2, mv = (lv + rv) / 2;
-        if (w->chosen[(size_t)mv * (size_t)w->n + (size_t)mu]) {
-            walk_triangle(w, mu, mv, lu, lv, au, av, inside);
-            walk_triangle(w, mu, mv, au, av, ru, rv, inside);
+    const uint32_t i = place_index(w, a), j = place_index(w, l), k = place_index(w, r);
+    put_triangle(w, i, j, k, clockwise);
+}
+
+static void walk_triangle(walk *w, uint32_t a, uint32_t l, uint32_t r, int splits, bool inside, bool clockwise) {
+    if (!inside || !w->plain) {
+        const corner ca = block_corner(w, a), cl = block_corner(w, l), cr = block_corner(w, r);
+        if (!inside) {
+            const rqt_relation relation = relation_of(w, ca.at, cl.at, cr.at);
+            if (relation == RQT_OUTSIDE) return;
+            inside = relation == RQT_INSIDE;
+        }
+        const uint32_t m = (l + r) / 2;
+        if (splits == 0 || !w->chosen[m]) {
+            emit(w, &ca, &cl, &cr, inside);
             return;
         }
+        walk_triangle(w, m, l, a, splits - 1, inside, !clockwise);
+        walk_triangle(w, m, a, r, splits - 1, inside, !clockwise);
+        return;
     }
-    const corner a = block_corner(w, au, av), l = block_corner(w, lu, lv), r = block_corner(w, ru, rv);
-    emit(w, &a, &l, &r, inside);
+    walk_plain(w, a, l, r, splits, clockwise);
 }
 
 static uint64_t morton_order(const walk *w, rqt_block_number number) {
@@ -232,9 +253,11 @@ static corner summary_corner(const rqt_summary_vertex *v, int32_t x, int32_t y) 
 static void walk_half(walk *w, const rqt_summary *summary, int a, int from, int to) {
     const rqt_block_place *p = &w->place;
     if (w->block) {
-        const int last = w->n - 1;
-        walk_triangle(w, a & 1 ? last : 0, a & 2 ? last : 0, from & 1 ? last : 0, from & 2 ? last : 0,
-                      to & 1 ? last : 0, to & 2 ? last : 0, false);
+        const uint32_t n = (uint32_t)w->n, last = n - 1, at[4] = {0, last, last * n, last * n + last};
+        /* In (col,row), from x x to: which way do apex, from, to turn? */
+        const int ax = a & 1, ay = a >> 1, fx = from & 1, fy = from >> 1, tx = to & 1, ty = to >> 1;
+        const bool clockwise = (fx - ax) * (ty - ay) - (tx - ax) * (fy - ay) < 0;
+        walk_triangle(w, at[a], at[from], at[to], 2 * w->query->k, false, clockwise);
         return;
     }
     corner c[3];
@@ -350,13 +373,23 @@ static rqt_status close_selection(walk *w) {
     return status;
 }
 
+/* Which vertices of the block are selected, and whether it needs care. */
 static void choose(walk *w) {
     const size_t count = (size_t)w->n * (size_t)w->n;
+    const rqt_code eps = w->query->eps, *error = w->block->error;
+    const uint8_t mask = w->query->outline == RQT_OUTLINE_EXACT ? RQT_OUTLINE : 0, *flags = w->block->flags;
     memset(w->memo, 0xFF, count * sizeof *w->memo);
+    uint8_t all = RQT_VALID;
+    for (size_t i = 0; i < count; i++) {
+        w->chosen[i] = (uint8_t)((error[i] > eps) | ((flags[i] & mask) != 0));
+        all &= flags[i];
+    }
+    w->plain = all && !w->clamped;
+    if (!w->selection) return;
     for (size_t i = 0; i < count; i++) {
         const rqt_vertex at = {w->place.x + (int32_t)(i % (size_t)w->n) * w->place.stride,
                                w->place.y + (int32_t)(i / (size_t)w->n) * w->place.stride};
-        w->chosen[i] = is_selected(w, at, w->block->error[i], w->block->flags[i]);
+        w->chosen[i] = rqt_selection_has(w->selection, at);
     }
 }
 
@@ -370,7 +403,7 @@ static rqt_status run(walk *w) {
         const rqt_status status = close_selection(w);
         if (status != RQT_OK) return status;
     }
-    for (size_t b = 0; b < query->answer_count && w->status == RQT_OK; b++) {
+    for (size_t b = 0; b < query->answer_count; b++) {
         const rqt_answer *answer = &query->answers[b];
         if (query->is_interrupted && query->is_interrupted(query->context)) return RQT_INTERRUPTED;
         (void)rqt_block_locate(&query->lattice, query->k, answer->number, &w->place);
@@ -379,11 +412,14 @@ static rqt_status run(walk *w) {
             w->block = query->read_block(query->context, answer->number);
             if (!w->block) return RQT_READ_FAILED;
             if (w->block->k != query->k) return RQT_CORRUPT;
-            choose(w);
         }
+        w->clamped = w->place.x + w->place.side > query->lattice.width - 1 ||
+                     w->place.y + w->place.side > query->lattice.height - 1;
+        if (!reserve(w)) return RQT_NO_MEMORY;
+        if (w->block) choose(w);
         walk_block(w, answer);
     }
-    return w->status;
+    return RQT_OK;
 }
 
 rqt_status rqt_query_run(rqt_query *query, const rqt_allocator *allocator, rqt_patch *patch) {
@@ -394,8 +430,7 @@ rqt_status rqt_query_run(rqt_query *query, const rqt_allocator *allocator, rqt_p
               .allocator = allocator,
               .patch = patch,
               .fine_levels = rqt_block_levels(&query->lattice, query->k),
-              .n = (1 << query->k) + 1,
-              .status = RQT_OK};
+              .n = (1 << query->k) + 1};
     const size_t count = (size_t)w.n * (size_t)w.n;
     w.chosen = memory_take(allocator, count);
     w.memo = memory_take(allocator, count * sizeof *w.memo);

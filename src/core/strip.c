@@ -10,18 +10,11 @@
  */
 #include "internal.h"
 
+#define CHUNK 1024 /* triangles between two looks at the memory */
+#define MOST_PER_TRIANGLE 5
+
 static bool holds(const uint32_t *triangle, uint32_t vertex) {
     return triangle[0] == vertex || triangle[1] == vertex || triangle[2] == vertex;
-}
-
-/* Is from -> to an edge of the triangle, in its winding? *opposite: its third vertex. */
-static bool has_edge(const uint32_t *triangle, uint32_t from, uint32_t to, uint32_t *opposite) {
-    for (int i = 0; i < 3; i++) {
-        if (triangle[i] != from || triangle[(i + 1) % 3] != to) continue;
-        *opposite = triangle[(i + 2) % 3];
-        return true;
-    }
-    return false;
 }
 
 rqt_status rqt_strip_build(const rqt_patch *patch, const rqt_allocator *allocator, uint32_t **strip, size_t *n) {
@@ -33,18 +26,24 @@ rqt_status rqt_strip_build(const rqt_patch *patch, const rqt_allocator *allocato
     for (size_t t = 0; t < patch->triangle_count; t++) {
         const uint32_t *now = patch->triangles + 3 * t;
         const uint32_t *next = t + 1 < patch->triangle_count ? now + 3 : NULL;
-        if (!memory_grow(allocator, (void **)&s, &capacity, count + 5, sizeof *s)) {
+        if (t % CHUNK == 0 &&
+            !memory_grow(allocator, (void **)&s, &capacity, count + MOST_PER_TRIANGLE * CHUNK, sizeof *s)) {
             memory_drop(allocator, s);
             return RQT_NO_MEMORY;
         }
         if (count >= 2) {
             const uint32_t u = s[count - 2], v = s[count - 1];
-            uint32_t third;
-            const bool even = (count & 1) == 0; /* parity of the triangle that starts at u */
-            if (even ? has_edge(now, u, v, &third) : has_edge(now, v, u, &third)) {
-                if (next && holds(next, u) && holds(next, third)) s[count++] = u;
-                s[count++] = third;
-                continue;
+            const int at = now[0] == u ? 0 : now[1] == u ? 1 : now[2] == u ? 2 : -1;
+            if (at >= 0) {
+                /* Counter-clockwise the triangle at an even place is u, v, third; at an odd one u, third, v. */
+                const uint32_t after = now[at == 2 ? 0 : at + 1], before = now[at == 0 ? 2 : at - 1];
+                const bool even = (count & 1) == 0;
+                if ((even ? after : before) == v) {
+                    const uint32_t third = even ? before : after;
+                    if (next && holds(next, u) && holds(next, third)) s[count++] = u;
+                    s[count++] = third;
+                    continue;
+                }
             }
         }
         /* A start: first the vertex that the next triangle does not have. */

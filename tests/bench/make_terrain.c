@@ -2,13 +2,13 @@
  *
  *     make_terrain K OUTPUT.bin [SEED]
  *
- * A square of (2^K + 1)^2 samples by midpoint displacement with successive random additions (every point of a lattice is
- * displaced again at every scale, which spares the creases of plain midpoint displacement), H = 0.9, stretched to
- * 0..4000 m and rounded to whole metres. Written as ENVI: raw little-endian int16 and a header beside it; 30 m cells,
- * UTM zone 32 north (EPSG:32632).
+ * A square of (2^K + 1)^2 samples by midpoint displacement with successive random additions (every point of a
+ * lattice is displaced again at every scale, which spares the creases of plain midpoint displacement), H = 0.9,
+ * stretched to 0..4000 m and rounded to whole metres. Written as ENVI: raw little-endian int16 and a header beside
+ * it; 30 m cells, UTM zone 32 north (EPSG:32632).
  *
- * The same bytes everywhere: additions and multiplications of doubles in a fixed order (compile without fused ones), no
- * function of libm, noise from an integer hash of place and scale.
+ * The same bytes everywhere: additions and multiplications of doubles in a fixed order (compile without fused
+ * ones), no function of libm, noise from an integer hash of place and scale.
  */
 #include <errno.h>
 #include <stdint.h>
@@ -125,11 +125,12 @@ static int write_header(const field *f, const char *path) {
     snprintf(name, sizeof name, "%.*s.hdr", (int)(dot - path), path);
     FILE *out = fopen(name, "w");
     if (!out) return 1;
-    fprintf(out,
-            "ENVI\ndescription = {fractional Brownian motion, H 0.9, seed %llu}\nsamples = %zu\nlines = %zu\n"
-            "bands = 1\nheader offset = 0\nfile type = ENVI Standard\ndata type = 2\ninterleave = bsq\nbyte order = 0\n"
-            "map info = {UTM, 1, 1, %.0f, %.0f, %.0f, %.0f, 32, North, WGS-84, units=Meters}\n",
-            (unsigned long long)f->seed, f->n, f->n, WEST, NORTH, CELL, CELL);
+    fprintf(
+        out,
+        "ENVI\ndescription = {fractional Brownian motion, H 0.9, seed %llu}\nsamples = %zu\nlines = %zu\n"
+        "bands = 1\nheader offset = 0\nfile type = ENVI Standard\ndata type = 2\ninterleave = bsq\nbyte order = 0\n"
+        "map info = {UTM, 1, 1, %.0f, %.0f, %.0f, %.0f, 32, North, WGS-84, units=Meters}\n",
+        (unsigned long long)f->seed, f->n, f->n, WEST, NORTH, CELL, CELL);
     const int failed = ferror(out);
     return fclose(out) || failed;
 }

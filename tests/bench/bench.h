@@ -1,0 +1,52 @@
+/* bench.h - times, their medians, and the table that shows them. */
+#ifndef RQT_BENCH_H
+#define RQT_BENCH_H
+
+#include <stdbool.h>
+#include <stdio.h>
+
+enum { BENCH_MOST_RUNS = 256 };
+
+/* What one thing took, run by run. */
+typedef struct bench_times {
+    int runs;
+    double value[BENCH_MOST_RUNS]; /* runs past the last one are not kept */
+} bench_times;
+
+typedef struct bench_summary {
+    int runs;
+    double median, low, high;
+} bench_summary;
+
+double bench_now(void); /* seconds */
+void bench_add(bench_times *times, double value);
+bench_summary bench_summarise(const bench_times *times);
+
+/* What a ratio should be; no aim: the number is shown for itself. */
+typedef enum bench_sense { BENCH_NO_AIM, BENCH_AT_MOST, BENCH_AT_LEAST } bench_sense;
+typedef struct bench_aim {
+    bench_sense sense;
+    double value;
+} bench_aim;
+
+typedef struct bench_table {
+    FILE *csv;
+    const char *machine, *data, *section;
+} bench_table;
+
+/* Opens the CSV file; NULL machine and data are not allowed. false: it cannot be written. */
+bool bench_table_open(bench_table *table, const char *csv, const char *machine, const char *data);
+/* A heading above the rows that follow. Columns: median, min, max, unit, ratio, aim. ratio: what it is of; "": there are
+ * none; NULL: rows of counts, which need no names of columns. */
+void bench_table_section(bench_table *table, const char *section, const char *title, const char *ratio);
+/* One row: the times scaled into the unit (factor * value, or factor / value when inverse), and the ratio of its
+ * median to the peer's, where there is one (inverse: of the rates). */
+void bench_table_row(bench_table *table, const char *what, const bench_times *times, const char *unit,
+                     double factor, bool inverse, const char *peer_name, const bench_times *peer, bench_aim aim);
+/* A single number that is counted, not timed. */
+void bench_table_count(bench_table *table, const char *what, double value, const char *unit, const char *peer_name,
+                       double peer, bench_aim aim);
+/* false: the CSV file is not whole. */
+bool bench_table_close(bench_table *table);
+
+#endif

@@ -1,0 +1,74 @@
+#!/usr/bin/env bash
+# bench.sh - `make bench`: rqt beside GDAL on a generated terrain of 4097 x 4097 samples.
+#
+# Needs the command and the extension (RQT, RQT_SO; default build/rqt and build/rqt.so), gcc, libgdal and libsqlite3. The
+# terrain and the programs stay in build/bench for the next time, with the figures in bench.csv.
+#   BENCH_K=12      2^K + 1 samples a side
+#   BENCH_RUNS=5    of whole programs
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+BUILD=${BUILD:-build}
+RQT=${RQT:-$BUILD/rqt}
+RQT_SO=${RQT_SO:-$BUILD/rqt.so}
+K=${BENCH_K:-12}
+RUNS=${BENCH_RUNS:-5}
+OUT=$BUILD/bench
+side=$(((1 << K) + 1))
+raster=$OUT/fbm_$side.bin
+tiff=$OUT/fbm_$side.tif
+mkdir -p "$OUT"
+
+for needed in "$RQT" "$RQT_SO"; do
+    [[ -e $needed ]] || { echo "bench: $needed is missing; run make first" >&2; exit 2; }
+done
+
+compile() { # OUTPUT FLAGS SOURCES...
+    local output=$1 flags=$2 s
+    shift 2
+    for s in "$@" tests/bench/bench.h; do
+        if [[ ! -e $output || $s -nt $output ]]; then
+            # shellcheck disable=SC2086
+            gcc -std=gnu11 -O3 -ffp-contract=off -Wall -Wextra -Wconversion -Wshadow -Werror "$@" -o "$output" $flags
+            return
+        fi
+    done
+}
+compile "$OUT/make_terrain" "" tests/bench/make_terrain.c
+compile "$OUT/bench" "$(gdal-config --cflags) -lsqlite3 $(gdal-config --libs) -lm" \
+    tests/bench/bench.c tests/bench/bench_table.c
+
+if [[ ! -e $raster || $OUT/make_terrain -nt $raster ]]; then
+    echo "Generating $side x $side samples ..." >&2
+    "$OUT/make_terrain" "$K" "$raster"
+    rm -f "$tiff"
+fi
+[[ -e $tiff ]] || gdal_translate -q -co TILED=YES -co COMPRESS=ZSTD -co PREDICTOR=2 "$raster" "$tiff"
+
+times=$OUT/times.txt
+echo "samples $((side * side))" >"$times"
+timed() { # NAME COMMAND...
+    local name=$1 begin=$EPOCHREALTIME end
+    shift
+    "$@" >"$OUT/log.txt" 2>&1 || { cat "$OUT/log.txt" >&2; exit 1; }
+    end=$EPOCHREALTIME
+    echo "$name $((${end/./} - ${begin/./}))e-6" >>"$times"
+}
+cog() { gdal_translate -q -of COG -co COMPRESS=ZSTD -co PREDICTOR=2 -co OVERVIEWS=AUTO "$@" "$raster" "$OUT/cog.tif"; }
+cat "$raster" >/dev/null # all of them find it in the page cache
+for ((run = 1; run <= RUNS; run++)); do
+    [[ ! -t 2 ]] || printf '\rImport and COG, run %d of %d ' "$run" "$RUNS" >&2
+    rm -f "$OUT"/fbm.gpkg "$OUT/cog.tif"
+    timed import "$RQT" import --name fbm "$raster" "$OUT/fbm.gpkg"
+    timed cog cog
+    rm -f "$OUT/cog.tif"
+    timed cog_threads cog -co NUM_THREADS=ALL_CPUS
+done
+[[ ! -t 2 ]] || printf '\r%40s\r' '' >&2
+echo "database_bytes $(stat -c %s "$OUT/fbm.gpkg")" >>"$times"
+echo "cog_bytes $(stat -c %s "$OUT/cog.tif")" >>"$times"
+
+machine="$(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo | head -n 1), $(nproc) cores"
+data="generated fBm (H 0.9, seed 1), $side x $side int16, 30 m cells, 0 to 4000 m"
+"$OUT/bench" "$OUT/fbm.gpkg" "$RQT_SO" "$tiff" "$times" "$OUT/bench.csv" "$machine" "$data"
+echo
+echo "The same figures: $OUT/bench.csv"
