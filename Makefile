@@ -116,7 +116,8 @@ test-quick: ## the tests without the sanitized build
 .PHONY: mutants
 mutants: ## break the code in one line, many times over: each time a named test must go red
 	@./src/install-packages.sh build test
-	@BUILD=$(BUILD) ./tests/mutants.sh
+	@$(MAKE) --no-print-directory -j2 test-programs
+	@/usr/bin/python3 tests/mutants.py $(BUILD)
 
 DATA ?= tests/data
 .PHONY: verify-data

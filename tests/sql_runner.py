@@ -47,7 +47,7 @@ def make(name, options):
                 if os.path.exists(s.temp(terrain + left)):
                     os.remove(s.temp(terrain + left))
         if not DATABASES[name]:
-            sqlite3.connect(path).execute("CREATE TABLE nothing(x)")
+            sqlite3.connect(path).execute("CREATE TABLE other(x)")
     return path
 
 

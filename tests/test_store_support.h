@@ -345,18 +345,25 @@ static inline void keep_error(answer *a, char *error) {
     sqlite3_free(error);
 }
 
-static inline answer query_store(store *s, const char *name, double eps, store_query_options options,
-                                 store_reads *reads) {
+/* wkt: the region; NULL is everything. reads may be NULL. */
+static inline answer query_region(store *s, const char *name, const char *wkt, double eps,
+                                  store_query_options options, store_reads *reads) {
     answer a = {0};
     const store_terrain *t;
     char *error = NULL;
+    rqt_geometry *geometry = NULL;
     rqt_region *region = NULL;
+    rqt_status status = RQT_OK;
+    rqt_message why;
     rqt_patch patch = {0};
     if (reads) memset(reads, 0, sizeof *reads);
     a.code = store_find(s, name, &t, &error);
-    if (a.code == SQLITE_OK)
-        a.code = store_fail_core(
-            &error, rqt_region_create(NULL, &t->placement, &t->lattice, store_allocator(), &region), "region");
+    if (a.code == SQLITE_OK) {
+        if (wkt) status = rqt_geometry_parse(wkt, strlen(wkt), true, store_allocator(), &geometry, &why);
+        if (status == RQT_OK)
+            status = rqt_region_create(geometry, &t->placement, &t->lattice, store_allocator(), &region);
+        a.code = store_fail_core(&error, status, "region");
+    }
     if (a.code == SQLITE_OK) a.code = store_query(s, t, region, eps, &options, &patch, reads, &error);
     a.triangles = patch.triangle_count;
     for (size_t i = 0; i < 3 * patch.triangle_count; i++) {
@@ -366,8 +373,14 @@ static inline answer query_store(store *s, const char *name, double eps, store_q
     }
     rqt_patch_free(&patch);
     rqt_region_free(region);
+    rqt_geometry_free(geometry);
     keep_error(&a, error);
     return a;
+}
+
+static inline answer query_store(store *s, const char *name, double eps, store_query_options options,
+                                 store_reads *reads) {
+    return query_region(s, name, NULL, eps, options, reads);
 }
 
 static inline answer query_database(sqlite3 *db, double eps, store_query_options options) {

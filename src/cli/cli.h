@@ -20,7 +20,6 @@ enum { CLI_OK = 0, CLI_FAILED = 1, CLI_USAGE = 2 };
 typedef struct cli_command {
     const char *name;
     const char *summary; /* one line of rqt --help */
-    const char *help;    /* the text of rqt NAME --help */
     int (*run)(int argc, char **argv);
 } cli_command;
 
@@ -35,8 +34,8 @@ int cli_fail(const char *format, ...) __attribute__((format(printf, 1, 2)));
 int cli_usage(const char *format, ...) __attribute__((format(printf, 1, 2)));
 /* The same without being a failure. */
 void cli_say(const char *format, ...) __attribute__((format(printf, 1, 2)));
-/* The help of the current command, on stdout. */
-int cli_help(void);
+/* A help text on stdout. */
+int cli_help(const char *text);
 
 /* -------------------------------------------------------------------------------------- options (options.c) -- */
 #define CLI_MAX_EPS 12
@@ -124,8 +123,9 @@ typedef struct cli_output {
     const char *path;
     char temporary[4096];
 } cli_output;
-/* Refuses folders and the file `forbidden`. The temporary file does not exist yet. */
-bool cli_output_begin(cli_output *output, const char *path, const char *forbidden);
+/* CLI_OK, or the exit status after a sentence: folders and the file `forbidden` are refused. The temporary file does
+ * not exist yet. */
+int cli_output_begin(cli_output *output, const char *path, const char *forbidden);
 bool cli_output_write(const cli_output *output, const void *bytes, size_t size);
 bool cli_output_finish(cli_output *output); /* renames; discards when that fails */
 void cli_output_discard(cli_output *output);

@@ -51,8 +51,8 @@ int cli_usage(const char *format, ...) {
     return CLI_USAGE;
 }
 
-int cli_help(void) {
-    fputs(cli_current->help, stdout);
+int cli_help(const char *text) {
+    fputs(text, stdout);
     return CLI_OK;
 }
 
@@ -101,7 +101,8 @@ static int dispatch(int argc, char **argv) {
         return cli_usage("there is no %s %s: the commands are import, info, check, verify and mesh",
                          name[0] == '-' ? "option" : "command", name);
     cli_current = command;
-    return help ? cli_help() : command->run(argc - 1, argv + 1);
+    char ask[] = "--help", *const asking[] = {argv[1], ask, NULL};
+    return help ? command->run(2, (char **)asking) : command->run(argc - 1, argv + 1);
 }
 
 int main(int argc, char **argv) {

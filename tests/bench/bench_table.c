@@ -41,7 +41,8 @@ void bench_table_section(bench_table *table, const char *section, const char *ti
     table->section = section;
     printf("\n%s\n", title);
     if (ratio)
-        printf("  %-46s %10s %10s %10s  %-7s %9s%s\n", "", "median", "min", "max", "", ratio, *ratio ? "  aim" : "");
+        printf("  %-46s %10s %10s %10s  %-7s %9s%s\n", "", "median", "min", "max", "", ratio,
+               *ratio ? "  aim" : "");
 }
 
 /* Four digits that say something, whatever the size. */

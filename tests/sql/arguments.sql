@@ -34,7 +34,7 @@ SELECT * FROM rqt_range;
 --! rqt_range(): region is missing
 SELECT * FROM rqt_verify WHERE eps = 1;
 --! rqt_verify(): region is missing
-SELECT * FROM rqt_range(NULL, 1, 'tent', NULL, 5);
+SELECT * FROM rqt_triangles(NULL, 1, 'tent', NULL, 5);
 --! too many arguments
 SELECT rqt_mesh(NULL, 1);
 --! wrong number of arguments

@@ -1,0 +1,180 @@
+/* command_import.c - rqt import: options, progress and the report around import_run. */
+#include "cli.h"
+#include "import.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+static const char HELP[] =
+    "rqt import: a raster, or several on one grid, becomes a terrain of a database\n"
+    "\n"
+    "Usage: rqt import [OPTION...] SOURCE... DATABASE\n"
+    "\n"
+    "SOURCE is whatever GDAL reads: GeoTIFF, .hgt (zipped too), ESRI ASCII grid, USGS DEM ... Several sources are\n"
+    "put together; where they overlap and differ, the later one wins. DATABASE is an SQLite file, made as a\n"
+    "GeoPackage when it does not exist. An import that fails or is stopped leaves it as it was.\n"
+    "\n"
+    "Options:\n"
+    "  --name N        name of the terrain (default: the first source's file name, up to its first dot)\n"
+    "  --replace       replace the terrain of this name\n"
+    "  --nodata V      samples of this value are voids, too\n"
+    "  --unit U        unit of the heights: m, ft, us-ft or a number of metres (default: what the raster says)\n"
+    "  --quantum Q     height step for rasters of floating-point numbers (default: chosen from the samples)\n"
+    "  --void-tol R    metres of void outline that may be lost for each metre of eps (default 1)\n"
+    "  --block K       blocks of 2^K + 1 samples a side, K 1 to 8 (default %d)\n"
+    "  --jobs J        threads (default: one for each processor)\n"
+    "  --memory MiB    memory that the import may take (default: half of the machine's, at most 4096)\n"
+    "  --help          this text\n"
+    "\n"
+    "Examples:\n"
+    "  rqt import N44W072.hgt.zip washington.gpkg\n"
+    "  rqt import --name pyrenees N42E001.hgt.zip N41E001.hgt.zip mountains.gpkg\n"
+    "  rqt import --nodata -9999 --unit ft --replace survey.tif county.gpkg\n";
+
+enum { NAME = 1000, BLOCK, NODATA, UNIT, QUANTUM, VOID_TOL, MINIMAL, JOBS, MEMORY, REPLACE };
+
+static const struct option OPTIONS[] = {{"name", required_argument, NULL, NAME},
+                                        {"block", required_argument, NULL, BLOCK},
+                                        {"nodata", required_argument, NULL, NODATA},
+                                        {"unit", required_argument, NULL, UNIT},
+                                        {"quantum", required_argument, NULL, QUANTUM},
+                                        {"void-tol", required_argument, NULL, VOID_TOL},
+                                        {"minimal", no_argument, NULL, MINIMAL},
+                                        {"jobs", required_argument, NULL, JOBS},
+                                        {"memory", required_argument, NULL, MEMORY},
+                                        {"replace", no_argument, NULL, REPLACE},
+                                        {"help", no_argument, NULL, 'h'},
+                                        {NULL, 0, NULL, 0}};
+
+/* Set by Ctrl-C (and by a polite kill); the progress callback hands it on, and the import rolls back. */
+static volatile sig_atomic_t stopped;
+
+static void stop(int number) {
+    (void)number;
+    stopped = 1;
+}
+
+static bool on_progress(void *context, const char *stage, double done, int64_t samples) {
+    cli_progress_show(context, stage, done, samples);
+    return !stopped;
+}
+
+static void on_notice(void *context, const char *sentence) {
+    cli_progress_wipe(context);
+    cli_say("%s", sentence);
+}
+
+/* CLI_OK, or CLI_USAGE after a sentence. */
+static int set_option(import_options *o, int option) {
+    int64_t n;
+    double number;
+    switch (option) {
+    case NAME:
+        if (!store_name_is_valid(optarg))
+            return cli_usage("--name %s: a name has 1 to 63 letters, digits, _ . or -", optarg);
+        o->name = optarg;
+        return CLI_OK;
+    case BLOCK:
+        if (!cli_integer(optarg, 1, RQT_MAX_BLOCK_K, &n))
+            return cli_usage("--block %s: K is a whole number from 1 to %d; blocks have 2^K + 1 samples a side",
+                             optarg, RQT_MAX_BLOCK_K);
+        o->k = (int)n;
+        return CLI_OK;
+    case NODATA:
+        /* Values like -3.4028235e38 and nan mark voids in real rasters. */
+        if (!cli_number(optarg, &number)) {
+            if (strcasecmp(optarg, "nan")) return cli_usage("--nodata %s is not a number", optarg);
+            number = (double)NAN;
+        }
+        o->has_nodata = true;
+        o->nodata = number;
+        return CLI_OK;
+    case UNIT:
+        if (strcmp(optarg, "m") && strcmp(optarg, "ft") && strcmp(optarg, "us-ft") &&
+            !(cli_number(optarg, &number) && number > 0))
+            return cli_usage("--unit %s: m, ft, us-ft or a number of metres", optarg);
+        o->unit = optarg;
+        return CLI_OK;
+    case QUANTUM:
+        if (!cli_number(optarg, &number) || number <= 0)
+            return cli_usage("--quantum %s is no height step: a number above 0", optarg);
+        o->quantum = number;
+        return CLI_OK;
+    case VOID_TOL:
+        if (!cli_number(optarg, &number) || number <= 0)
+            return cli_usage("--void-tol %s: metres of outline for each metre of eps, a number above 0", optarg);
+        o->void_tol = number;
+        return CLI_OK;
+    case JOBS:
+        if (!cli_integer(optarg, 1, 1024, &n)) return cli_usage("--jobs %s: a whole number from 1 to 1024", optarg);
+        o->jobs = (int)n;
+        return CLI_OK;
+    case MEMORY:
+        if (!cli_integer(optarg, 1, (int64_t)1 << 30, &n))
+            return cli_usage("--memory %s: a whole number of MiB, 1 or more", optarg);
+        o->memory = n << 20;
+        return CLI_OK;
+    case REPLACE:
+        o->replace = true;
+        return CLI_OK;
+    case MINIMAL:
+        return cli_usage("--minimal is not in this version");
+    default:
+        return CLI_USAGE; /* cli_option has said why */
+    }
+}
+
+static void print_report(const import_report *r, double seconds) {
+    const double samples = (double)r->samples;
+    printf("%s: %s samples, ", r->name, cli_count(r->samples));
+    if (r->voids)
+        printf("%s void (%.3g %%)\n", cli_count(r->voids), 100.0 * (double)r->voids / samples);
+    else
+        puts("none void");
+    printf("  %s blocks, %s bytes, %.2f bits per sample\n", cli_count(r->blocks), cli_count(r->bytes),
+           8.0 * (double)r->bytes / samples);
+    printf("  %.2f s (reading %.2f, errors %.2f, blocks %.2f), %.1f Msamples/s\n", seconds, r->seconds_read,
+           r->seconds_errors, r->seconds_blocks, samples / (seconds > 1e-9 ? seconds : 1e-9) / 1e6);
+    if (r->overlap)
+        printf("  %s samples in more than one source, %s of them differ\n", cli_count(r->overlap),
+               cli_count(r->overlap_differs));
+}
+
+static int run(int argc, char **argv) {
+    import_options options;
+    import_options_init(&options);
+    for (int option; (option = cli_option(argc, argv, "h", OPTIONS)) != -1;) {
+        if (option == 'h') {
+            printf(HELP, options.k);
+            return CLI_OK;
+        }
+        const int status = set_option(&options, option);
+        if (status != CLI_OK) return status;
+    }
+    if (argc - optind < 2)
+        return cli_usage(argc == optind ? "a source and a database are missing"
+                                        : "the database is missing: rqt import SOURCE... DATABASE");
+    cli_progress progress;
+    cli_progress_begin(&progress);
+    options.progress = on_progress;
+    options.notice = on_notice;
+    options.context = &progress;
+
+    /* The second Ctrl-C ends the process as usual: SQLite rolls back when the database is next opened. */
+    const struct sigaction action = {.sa_handler = stop, .sa_flags = (int)SA_RESETHAND};
+    sigaction(SIGINT, &action, NULL);
+    sigaction(SIGTERM, &action, NULL);
+
+    import_report report;
+    char message[2048];
+    const double start = cli_seconds();
+    const int failed = import_run((const char *const *)argv + optind, argc - optind - 1, argv[argc - 1], &options,
+                                  &report, message, sizeof message);
+    cli_progress_wipe(&progress);
+    if (failed) return cli_fail("%s", message);
+    print_report(&report, cli_seconds() - start);
+    return CLI_OK;
+}
+
+const cli_command command_import = {"import", "a raster becomes a terrain of a database", run};

@@ -1,0 +1,129 @@
+/* database.c - the connection: opened read-only, with the SQL functions, and its failures as sentences.
+ *
+ * The functions are linked in, not loaded: the same sources as rqt.so, compiled for plain calls of SQLite, so the
+ * command works where loading extensions is not allowed.
+ */
+#include "cli.h"
+#include "rqt_extension.h"
+
+#include <errno.h>
+#include <math.h>
+#include <string.h>
+#include <sys/stat.h>
+
+/* A writer (an import, say) holds its lock for moments only. */
+#define BUSY_MILLISECONDS 5000
+
+int cli_fail_database(sqlite3 *db) {
+    const char *text = sqlite3_errmsg(db);
+    /* "rqt_mesh(): eps ..." names the SQL function; who typed a command knows only the command. */
+    if (!strncmp(text, "rqt_", 4)) {
+        const size_t name = strspn(text, "abcdefghijklmnopqrstuvwxyz_");
+        if (!strncmp(text + name, "(): ", 4)) text += name + 4;
+    }
+    return cli_fail("%s", text);
+}
+
+int cli_fail_store(int code, char *sentence) {
+    cli_fail("%s", sentence ? sentence : sqlite3_errstr(code));
+    sqlite3_free(sentence);
+    return CLI_FAILED;
+}
+
+sqlite3 *cli_open(const char *path) {
+    struct stat file;
+    sqlite3 *db = NULL;
+    char *sentence = NULL;
+    if (stat(path, &file)) {
+        cli_fail("%s: %s", path, strerror(errno));
+        return NULL;
+    }
+    if (S_ISDIR(file.st_mode)) {
+        cli_fail("%s is a folder and not a database", path);
+        return NULL;
+    }
+    int code = sqlite3_open_v2(path, &db, SQLITE_OPEN_READONLY, NULL);
+    if (code == SQLITE_OK) {
+        sqlite3_busy_timeout(db, BUSY_MILLISECONDS);
+        /* The first look into the file: it finds out whether it is a database at all. */
+        code = sqlite3_exec(db, "SELECT count(*) FROM sqlite_schema", NULL, NULL, NULL);
+    }
+    if (code != SQLITE_OK) {
+        if (code == SQLITE_NOTADB)
+            cli_fail("%s is not an SQLite database", path);
+        else
+            cli_fail("%s: %s", path, db ? sqlite3_errmsg(db) : sqlite3_errstr(code));
+    } else {
+        code = sqlite3_rqt_init(db, &sentence, NULL);
+        if (code != SQLITE_OK) cli_fail("%s", sentence ? sentence : sqlite3_errmsg(db));
+        sqlite3_free(sentence);
+    }
+    if (code == SQLITE_OK) return db;
+    sqlite3_close(db);
+    return NULL;
+}
+
+bool cli_execute(sqlite3 *db, const char *sql) {
+    if (sqlite3_exec(db, sql, NULL, NULL, NULL) == SQLITE_OK) return true;
+    cli_fail_database(db);
+    return false;
+}
+
+sqlite3_stmt *cli_prepare(sqlite3 *db, const char *sql) {
+    sqlite3_stmt *statement = NULL;
+    if (sqlite3_prepare_v2(db, sql, -1, &statement, NULL) != SQLITE_OK) cli_fail_database(db);
+    return statement;
+}
+
+void cli_bind_query(sqlite3_stmt *statement, const char *region, double eps, const char *terrain) {
+    sqlite3_bind_text(statement, 1, region, -1, SQLITE_STATIC);
+    sqlite3_bind_double(statement, 2, eps);
+    sqlite3_bind_text(statement, 3, terrain, -1, SQLITE_STATIC);
+}
+
+bool cli_find_terrain(sqlite3 *db, const char *name, store **s, const store_terrain **terrain) {
+    char *sentence = NULL;
+    *s = NULL;
+    int code = store_open(db, s);
+    if (code == SQLITE_OK) code = store_find(*s, name, terrain, &sentence);
+    if (code == SQLITE_OK) return true;
+    cli_fail_store(code, sentence);
+    if (*s) store_close(*s);
+    *s = NULL;
+    return false;
+}
+
+bool cli_verify(sqlite3 *db, const char *region, double eps, const char *terrain, cli_proof *proof) {
+    sqlite3_stmt *row = cli_prepare(db, "SELECT samples, vertices, triangles, max_error, rms_error, x, y, "
+                                        "t_junctions, overlaps, uncovered FROM rqt_verify(?1, ?2, ?3)");
+    if (!row) return false;
+    cli_bind_query(row, region, eps, terrain);
+    const int code = sqlite3_step(row);
+    if (code == SQLITE_ROW) {
+        *proof = (cli_proof){.samples = sqlite3_column_int64(row, 0),
+                             .vertices = sqlite3_column_int64(row, 1),
+                             .triangles = sqlite3_column_int64(row, 2),
+                             .max_error = sqlite3_column_double(row, 3),
+                             .rms_error = sqlite3_column_double(row, 4),
+                             .has_worst = sqlite3_column_type(row, 5) != SQLITE_NULL,
+                             .x = sqlite3_column_double(row, 5),
+                             .y = sqlite3_column_double(row, 6),
+                             .t_junctions = sqlite3_column_int64(row, 7),
+                             .overlaps = sqlite3_column_int64(row, 8),
+                             .uncovered = sqlite3_column_int64(row, 9)};
+    } else if (code == SQLITE_DONE) {
+        cli_fail("rqt_verify() gave no row");
+    } else {
+        cli_fail_database(db);
+    }
+    sqlite3_finalize(row);
+    return code == SQLITE_ROW;
+}
+
+/* The promise: nowhere further than max(eps, quantum_error) from a sample of the source. The stored heights are within
+ * quantum_error of the source's, and the mesh within eps - quantum_error of them, or exactly on them. The verifier
+ * multiplies by a quantum that is itself rounded: an equality may be two units of the last place off. */
+bool cli_proof_holds(const cli_proof *proof, double eps, double quantum_error) {
+    const double allowed = fmax(eps - quantum_error, 0) * (1 + 0x1p-51);
+    return proof->max_error <= allowed && !proof->t_junctions && !proof->overlaps && !proof->uncovered;
+}

@@ -1,0 +1,87 @@
+/* output.c - files that are whole or not there: written under a temporary name beside their own, then renamed.
+ *
+ * A signal that would end the process removes the temporary file first (SIGKILL cannot be caught; what it leaves is
+ * named FILE.part-PID and is never mistaken for the file).
+ */
+#include "cli.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+/* What the signal handler removes: only unlink and raise, which are safe there. An SQLite file may have a journal. */
+static char signal_file[4096], signal_journal[4112];
+
+static void remove_and_die(int number) {
+    unlink(signal_file);
+    unlink(signal_journal);
+    raise(number); /* SA_RESETHAND has put the default back */
+}
+
+static void watch_signals(bool on) {
+    static const int numbers[] = {SIGINT, SIGTERM, SIGHUP, SIGPIPE};
+    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
+        struct sigaction action = {.sa_handler = on ? remove_and_die : SIG_DFL,
+                                   .sa_flags = on ? (int)(SA_RESETHAND | SA_NODEFER) : 0};
+        sigaction(numbers[i], &action, NULL);
+    }
+}
+
+int cli_output_begin(cli_output *output, const char *path, const char *forbidden) {
+    struct stat file, other;
+    *output = (cli_output){.path = path};
+    if (stat(path, &file) == 0) {
+        if (S_ISDIR(file.st_mode)) {
+            return cli_usage("%s is a folder; -o names a file", path);
+        }
+        if (stat(forbidden, &other) == 0 && file.st_dev == other.st_dev && file.st_ino == other.st_ino) {
+            return cli_usage("%s is the database itself; -o names another file", path);
+        }
+    }
+    const int length =
+        snprintf(output->temporary, sizeof output->temporary, "%s.part-%ld", path, (long)getpid());
+    if (length < 0 || (size_t)length >= sizeof output->temporary) {
+        return cli_fail("the file name is too long");
+    }
+    /* Where it cannot be written is said before the mesh is made, not after. */
+    FILE *probe = fopen(output->temporary, "wxe");
+    if (!probe) {
+        return cli_fail("%s cannot be written: %s", path, strerror(errno));
+    }
+    fclose(probe);
+    unlink(output->temporary);
+    memcpy(signal_file, output->temporary, sizeof signal_file);
+    snprintf(signal_journal, sizeof signal_journal, "%s-journal", output->temporary);
+    watch_signals(true);
+    return CLI_OK;
+}
+
+bool cli_output_write(const cli_output *output, const void *bytes, size_t size) {
+    FILE *file = fopen(output->temporary, "wxe");
+    bool ok = file && (!size || fwrite(bytes, 1, size, file) == size);
+    int reason = errno;
+    if (file && fclose(file)) {
+        if (ok) reason = errno;
+        ok = false;
+    }
+    if (!ok) cli_fail("%s cannot be written: %s", output->path, strerror(reason));
+    return ok;
+}
+
+bool cli_output_finish(cli_output *output) {
+    const bool ok = rename(output->temporary, output->path) == 0;
+    if (!ok) {
+        cli_fail("%s cannot be written: %s", output->path, strerror(errno));
+        unlink(output->temporary);
+    }
+    watch_signals(false);
+    return ok;
+}
+
+void cli_output_discard(cli_output *output) {
+    unlink(signal_journal);
+    unlink(output->temporary);
+    watch_signals(false);
+}

@@ -1,0 +1,156 @@
+#!/usr/bin/python3
+"""mutants.py BUILD - breaks the code one line at a time and sees a named test go red.
+
+A mutant is (what it breaks, file, text, replacement, test program, test). The first occurrence of the text is replaced in a copy of
+the tree; the program is built and run there; the mutant is caught when the program fails and names that test (or hangs).
+A text that is not found is a failure too: the list has to follow the code.
+"""
+import os
+import shutil
+import subprocess
+import sys
+
+MUTANTS = [
+    # the bound
+    ("bound: fewer samples count", "src/core/error.c",
+     "const int64_t most = dm > dp ? (dm > dn ? dm : dn) : (dp > dn ? dp : dn);", "const int64_t most = dm;",
+     "test_core_lattice", "errors_equal_the_oracles_on_adversarial_surfaces"),
+    ("bound: 32 bits where they are too few", "src/core/error.c",
+     "INT64_C(1) << (29 - (m < 29 ? m : 29))", "INT64_C(1) << (33 - (m < 29 ? m : 29))",
+     "test_core_lattice", "errors_equal_the_oracles_on_adversarial_surfaces"),
+    ("bound: the plane tilts the wrong way", "src/core/error.c", "        if (a.y == y0) gy = -gy;\n", "",
+     "test_core_lattice", "a_plane_has_no_error_anywhere"),
+    ("bound: clamped triangles taken for nested", "src/core/error.c",
+     "if (clamped) return visit_irregular(s, t, m, -1);", "if (clamped) return visit_irregular(s, t, m, state);",
+     "test_core_lattice", "errors_equal_the_oracles_for_every_small_extent"),
+    ("bound: eps ignores what quantisation lost", "src/core/code.c",
+     "if ((eps - rest) - quantum_error < 0) rest = nextafter(rest, 0);", "",
+     "test_core_codes", "eps_gives_up_the_quantum_error_and_rounds_down"),
+    ("voids: an outline costs nothing", "src/core/error.c", "if (ground > code) code = ground;", "(void)ground;",
+     "test_core_lattice", "errors_equal_the_oracles_for_every_small_extent"),
+    ("voids: two valid corners are enough", "src/core/query.c",
+     "if (!(a->flags & b->flags & c->flags & RQT_VALID)) return false;",
+     "if (!(a->flags & b->flags & RQT_VALID)) return false;",
+     "test_core_query", "no_valid_sample_is_further_than_eps_and_exact_outlines_are_exact"),
+    # the rounding direction
+    ("rounding: doubles taken at their word", "src/core/code.c",
+     "const rqt_code low = code_above_bits(bits - 64), high = code_above_bits(bits + 64);",
+     "const rqt_code low = code_above_bits(bits), high = code_above_bits(bits);",
+     "test_core_lattice", "errors_equal_the_oracles_in_feet_and_in_thousandths"),
+    ("rounding: down instead of up", "src/core/code.c", "(((int64_t)1 << DROPPED) - 1)", "0",
+     "test_core_codes", "errors_in_quanta_round_up_only_next_to_every_code"),
+    # the closure
+    ("closure: saturation misses two children", "src/core/saturate.c", "if (most > *c) *c = most;", "if (ab > *c) *c = ab;",
+     "test_core_lattice", "errors_equal_the_oracles_for_every_small_extent"),
+    ("closure: one step instead of all", "src/core/selection.c",
+     "if (added) stack[depth++] = parents[i];", "if (added && depth == 0) stack[depth++] = parents[i];",
+     "test_core_lattice", "closures_of_random_vertices_equal_the_oracles"),
+    ("closure: centres before sides", "src/core/selection.c",
+     "& (v.y >> scale) & 1) ? 1 : 0)", "& (v.y >> scale) & 1) ? 0 : 1)",
+     "test_core_lattice", "closures_of_random_vertices_equal_the_oracles"),
+    ("closure: >= instead of >", "src/core/selection.c", "if (code <= eps && !outline) continue;",
+     "if (code < eps && !outline) continue;",
+     "test_core_lattice", "algorithms_1_and_2_and_a_threshold_select_the_same"),
+    ("closure: the diagonal of every cell the same", "src/core/lattice.c", ">> (scale + 1)) & 1) == 0;",
+     ">> (scale + 1)) & 1) != 2;",
+     "test_core_lattice", "parents_children_and_levels_equal_the_oracles_graph"),
+    # far heights and the interval pyramid
+    ("far: the near corner instead", "src/core/pyramid.c", "summary_vertex(p, 2 * ax - cx, cy)", "summary_vertex(p, ax, cy)",
+     "test_core_query", "blocks_and_summaries_hold_what_the_oracle_says"),
+    ("pyramid: a block answers for its parent", "src/core/summary.c", "eps < interval->em_parent",
+     "eps <= interval->em_parent", "test_core_query", "every_place_has_exactly_one_answering_block"),
+    ("pyramid: outline bits below forgotten", "src/core/pyramid.c",
+     "            block->outline |= outline;\n", "            (void)outline;\n",
+     "test_core_query", "blocks_and_summaries_hold_what_the_oracle_says"),
+    ("walk: a shared quarter twice", "src/core/query.c",
+     "if (sibling < answer->number && has_answer(w, sibling)) continue;", "",
+     "test_core_query", "parts_of_a_split_window_make_exactly_the_whole"),
+    ("walk: a shared quarter never", "src/core/query.c",
+     "if (sibling < answer->number && has_answer(w, sibling)) continue;", "if (has_answer(w, sibling)) continue;",
+     "test_core_query", "queries_equal_the_global_walk_on_small_rasters"),
+    ("walk: every half is walked", "src/core/query.c", "if (is_selected(w, at, apex->error, apex->flags)) {", "if (true) {",
+     "test_core_query", "queries_equal_the_global_walk_on_small_rasters"),
+    # the winding
+    ("winding: strips do not turn", "src/core/strip.c", "s[count++] = even ? b : c;\n        s[count++] = even ? c : b;",
+     "s[count++] = b;\n        s[count++] = c;", "test_core_strip", "strips_of_patches_are_the_patches"),
+    ("winding: triangles do not turn with depth", "src/core/query.c",
+     "walk_plain(w, m, l, a, splits - 1, !clockwise);", "walk_plain(w, m, l, a, splits - 1, clockwise);",
+     "test_core_query", "queries_equal_the_global_walk_on_small_rasters"),
+    # regions
+    ("region: coordinates cut off instead of rounded", "src/core/region.c", "return (int64_t)rint(units);",
+     "return (int64_t)floor(units);", "test_core_query", "queries_equal_the_global_walk_on_small_rasters"),
+    ("region: touching counts as crossing", "src/core/region_edges.c", "<= 0", "< 0", "test_region",
+     "test_polygons_meet_as_the_oracle_says"),
+    # stored bytes
+    ("bytes: the checksum is not compared", "src/core/block_codec.c", "checksum64(bytes, size, AT_CHECKSUM)",
+     "get64(bytes + AT_CHECKSUM)", "test_codec", "every_flipped_bit_of_a_block_is_noticed"),
+    ("bytes: a short payload passes", "src/core/block_codec.c", "if (got != h->payload)", "if (got < h->payload)",
+     "test_codec", "a_payload_that_lies_is_found_out_under_a_good_checksum"),
+    ("bytes: the predictor slips by half a step", "src/core/block_predict.c", "0.5 - 0x1p-21", "0.5",
+     "test_codec", "the_bytes_of_a_block_mean_what_the_format_says"),
+    # memory
+    ("memory: a refused allocation passes for done", "src/core/selection.c", "if (!slot) return RQT_NO_MEMORY;",
+     "if (!slot) return RQT_OK;", "test_core_memory", "one_refused_allocation_is_reported_and_nothing_leaks"),
+    # the verifier
+    ("verifier: rounds errors down", "src/verify/verify_error.c", "bool cut = rest != 0;", "bool cut = false;",
+     "test_verify", "the_error_is_the_double_nearest_to_the_exact_value"),
+    ("verifier: looks at one size of triangle only", "src/verify/verify_overlap.c", "level < LEVELS", "level <= our_level",
+     "test_verify", "triangles_of_very_different_size_are_compared"),
+    # import
+    ("import: south-up rasters upside down", "src/import/mosaic.c", "if (!(off <= SLACK))", "if (false)",
+     "test_import", "sources_of_unlike_grids_are_refused"),
+    ("import: heights far from zero", "src/import/quantise.c", "(int64_t)middle", "(int64_t)0",
+     "test_import", "heights_far_from_zero_lose_nothing"),
+]
+
+
+def main():
+    build = sys.argv[1] if len(sys.argv) > 1 else "build"
+    only = sys.argv[2] if len(sys.argv) > 2 else ""
+    tree = os.path.join(build, "mutants")
+    shutil.rmtree(tree, ignore_errors=True)
+    os.makedirs(tree)
+    for name in ("src", "ext", "sql", "tests", "Makefile"):
+        (shutil.copytree if os.path.isdir(name) else shutil.copy2)(name, os.path.join(tree, name))
+    # Objects are up to date with the sources they came from: times are kept.
+    shutil.copytree(build, os.path.join(tree, "build"),
+                    ignore=shutil.ignore_patterns("mutants", "sanitized", "bench", "demo", "*.log"))
+    environment = dict(os.environ, RQT_SEED="1")
+    caught = missed = 0
+    for what, path, old, new, program, test in MUTANTS:
+        if only not in what:
+            continue
+        target = os.path.join(tree, path)
+        with open(path, encoding="utf-8") as f:
+            text = f.read()
+        verdict = "not found in " + path
+        if old in text:
+            with open(target, "w", encoding="utf-8") as f:
+                f.write(text.replace(old, new, 1))
+            made = subprocess.run(["make", "-s", "-j2", "WARNINGS=", "build/tests/" + program], cwd=tree,
+                                  capture_output=True, text=True)
+            verdict = "does not build:\n" + made.stderr[-1500:]
+            if made.returncode == 0:
+                try:
+                    ran = subprocess.run(["build/tests/" + program], cwd=tree, capture_output=True, text=True,
+                                         errors="replace", timeout=120, env=environment)
+                    output = ran.stdout + ran.stderr
+                    named = any(test in line and ("FAILED" in line or "ERROR" in line) for line in output.splitlines())
+                    red = ran.returncode != 0 and (named or ran.returncode < 0)
+                    verdict = "" if red else "SURVIVED " + program + (
+                        " (red, but not " + test + ")" if ran.returncode else "")
+                except subprocess.TimeoutExpired:
+                    verdict = ""
+            shutil.copy2(path, target)
+            os.utime(target)
+        if verdict:
+            missed += 1
+            print("MISSED  %-48s %s" % (what, verdict), flush=True)
+        else:
+            caught += 1
+            print("caught  %-48s by %s" % (what, test), flush=True)
+    print("%d passed, %d failed" % (caught, missed))
+    return missed != 0
+
+
+sys.exit(main())

@@ -1,0 +1,116 @@
+-- Options: what works gives the same mesh; all else is refused with its name.
+--# database tent
+SELECT count(*) FROM rqt_triangles(NULL, 1, NULL, '{}');
+--> 4
+SELECT count(*) FROM rqt_triangles(NULL, 1, NULL, ' { "mode" : "cover" } ');
+--> 4
+SELECT count(*) FROM rqt_triangles(NULL, 1, NULL, '{"outline":"exact"}');
+--> 4
+SELECT count(*) FROM rqt_triangles(NULL, 1, NULL, '{"metric":"exact"}');
+--> 4
+SELECT count(*) FROM rqt_triangles(NULL, 1, NULL, '{"select":"threshold"}');
+--> 4
+SELECT count(*) FROM rqt_triangles(NULL, 1, NULL, '{"select":"topdown"}');
+--> 4
+SELECT count(*) FROM rqt_triangles(NULL, 1, NULL, '{"select":"bottomup"}');
+--> 4
+SELECT count(*) FROM rqt_triangles(NULL, 1, NULL, '{"strip":"bintree"}');
+--> 4
+SELECT count(*) FROM rqt_triangles(NULL, 1, NULL, '{"mode":"cover","outline":"exact","metric":"exact","select":"topdown","strip":"bintree"}');
+--> 4
+SELECT count(*) FROM rqt_triangles(NULL, 1, NULL, NULL);
+--> 4
+
+-- of the contract, not yet here
+SELECT * FROM rqt_range(NULL, 1, NULL, '{"mode":"snap"}');
+--! rqt_range(): option "mode":"snap" is not in this version
+SELECT * FROM rqt_strip(NULL, 1, NULL, '{"mode":"border"}');
+--! rqt_strip(): option "mode":"border" is not in this version
+SELECT * FROM rqt_verify(NULL, 1, NULL, '{"mode":"cut"}');
+--! rqt_verify(): option "mode":"cut" is not in this version
+SELECT rqt_mesh(NULL, 1, 'obj', NULL, '{"outline":"tol"}');
+--! rqt_mesh(): option "outline":"tol" is not in this version
+SELECT * FROM rqt_explain(NULL, 1, NULL, '{"metric":"minimal"}');
+--! rqt_explain(): option "metric":"minimal" is not in this version
+SELECT * FROM rqt_triangles(NULL, 1, NULL, '{"metric":"local"}');
+--! rqt_triangles(): option "metric":"local" is not in this version
+SELECT * FROM rqt_range(NULL, 1, NULL, '{"metric":"wedgie"}');
+--! rqt_range(): option "metric":"wedgie" is not in this version
+SELECT * FROM rqt_strip(NULL, 1, NULL, '{"metric":"euclid"}');
+--! rqt_strip(): option "metric":"euclid" is not in this version
+SELECT * FROM rqt_verify(NULL, 1, NULL, '{"strip":"fan"}');
+--! rqt_verify(): option "strip":"fan" is not in this version
+SELECT rqt_mesh(NULL, 1, 'obj', NULL, '{"detail":5}');
+--! rqt_mesh(): option "detail" is not in this version
+SELECT * FROM rqt_explain(NULL, 1, NULL, '{"max_vertices":100}');
+--! rqt_explain(): option "max_vertices" is not in this version
+SELECT * FROM rqt_triangles(NULL, 1, NULL, '{"max_triangles":100}');
+--! rqt_triangles(): option "max_triangles" is not in this version
+SELECT * FROM rqt_range(NULL, 1, NULL, '{"previous":"x"}');
+--! rqt_range(): option "previous" is not in this version
+SELECT * FROM rqt_strip(NULL, 1, NULL, '{"frame":null}');
+--! rqt_strip(): option "frame" is not in this version
+SELECT * FROM rqt_verify(NULL, 1, NULL, '{"test":{}}');
+--! rqt_verify(): option "test" is not in this version
+
+-- unknown keys and values
+SELECT rqt_mesh(NULL, 1, 'obj', NULL, '{"modus":"cover"}');
+--! rqt_mesh(): unknown option "modus"
+SELECT * FROM rqt_explain(NULL, 1, NULL, '{"Mode":"cover"}');
+--! rqt_explain(): unknown option "Mode"
+SELECT * FROM rqt_triangles(NULL, 1, NULL, '{"":"cover"}');
+--! rqt_triangles(): unknown option ""
+SELECT * FROM rqt_range(NULL, 1, NULL, '{"mode":"clip"}');
+--! rqt_range(): option "mode"
+SELECT * FROM rqt_strip(NULL, 1, NULL, '{"mode":"COVER"}');
+--! rqt_strip(): option "mode"
+SELECT * FROM rqt_verify(NULL, 1, NULL, '{"mode":""}');
+--! rqt_verify(): option "mode"
+SELECT rqt_mesh(NULL, 1, 'obj', NULL, '{"mode":"cover snap"}');
+--! rqt_mesh(): option "mode"
+SELECT * FROM rqt_explain(NULL, 1, NULL, '{"outline":"loose"}');
+--! rqt_explain(): option "outline"
+SELECT * FROM rqt_triangles(NULL, 1, NULL, '{"metric":"l2"}');
+--! rqt_triangles(): option "metric"
+SELECT * FROM rqt_range(NULL, 1, NULL, '{"select":"best"}');
+--! rqt_range(): option "select"
+SELECT * FROM rqt_strip(NULL, 1, NULL, '{"strip":"long"}');
+--! rqt_strip(): option "strip"
+SELECT * FROM rqt_verify(NULL, 1, NULL, '{"mode":1}');
+--! rqt_verify(): option "mode"
+SELECT rqt_mesh(NULL, 1, 'obj', NULL, '{"mode":null}');
+--! rqt_mesh(): option "mode"
+SELECT * FROM rqt_explain(NULL, 1, NULL, '{"select":["topdown"]}');
+--! rqt_explain(): option "select"
+SELECT * FROM rqt_triangles(NULL, 1, NULL, '{"mode":"cover","eps":1}');
+--! rqt_triangles(): unknown option "eps"
+SELECT * FROM rqt_range(NULL, 1, NULL, '{"select":"topdown","select":"topdown"}');
+--! rqt_range(): option "select" is given twice
+SELECT * FROM rqt_strip(NULL, 1, NULL, '{"mode":"cover","select":"topdown","mode":"cover"}');
+--! rqt_strip(): option "mode" is given twice
+
+-- not JSON, not an object
+SELECT * FROM rqt_verify(NULL, 1, NULL, '');
+--! rqt_verify(): options are not JSON
+SELECT rqt_mesh(NULL, 1, 'obj', NULL, 'mode=cover');
+--! rqt_mesh(): options are not JSON
+SELECT * FROM rqt_explain(NULL, 1, NULL, '{"mode":"cover"');
+--! rqt_explain(): options are not JSON
+SELECT * FROM rqt_triangles(NULL, 1, NULL, '{"mode":"cover"} x');
+--! rqt_triangles(): options are not JSON
+SELECT * FROM rqt_range(NULL, 1, NULL, '{mode:"cover"}');
+--! rqt_range(): options are not JSON
+SELECT * FROM rqt_strip(NULL, 1, NULL, '[]');
+--! rqt_strip(): options must be a JSON object
+SELECT * FROM rqt_verify(NULL, 1, NULL, '["cover"]');
+--! rqt_verify(): options must be a JSON object
+SELECT rqt_mesh(NULL, 1, 'obj', NULL, '"cover"');
+--! rqt_mesh(): options must be a JSON object
+SELECT * FROM rqt_explain(NULL, 1, NULL, 'null');
+--! rqt_explain(): options must be a JSON object
+SELECT * FROM rqt_triangles(NULL, 1, NULL, '5');
+--! rqt_triangles(): options must be a JSON object
+SELECT * FROM rqt_range(NULL, 1, NULL, 5);
+--! rqt_range(): options must be a JSON object
+SELECT * FROM rqt_range(NULL, 1, NULL, x'00');
+--! rqt_range(): options
