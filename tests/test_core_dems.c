@@ -41,7 +41,8 @@ static int for_each_dem(void (*check)(raster r)) {
     int count = 0;
     for (const struct dirent *entry; (entry = readdir(list)) != NULL;) {
         char path[1024];
-        if (!strstr(entry->d_name, "161.tif")) continue;
+        const char *ending = strstr(entry->d_name, "161.tif");
+        if (!ending || ending[7]) continue;
         (void)snprintf(path, sizeof path, "%s/%s", folder, entry->d_name);
         printf("%s\n", entry->d_name);
         check(read_dem(path));

@@ -72,6 +72,9 @@ static void outline_unsaturated(rqt_block *b) {
 static void void_without_outline(rqt_block *b) {
     b->flags[FINE] = 0;
 }
+static void outline_of_root_corner(rqt_block *b) {
+    b->flags[4] ^= RQT_OUTLINE;
+}
 static void narrower(rqt_block *b) {
     b->width = 3;
 }
@@ -260,6 +263,12 @@ static void an_outline_bit_that_is_lost_beside_a_void_is_found(void **state) {
     assert_int_equal(check_terrain(db, &f), SQLITE_OK);
     assert_true(has_finding(&f, 268, "its parent, block 67, about the flags"));
     assert_true(has_finding(&f, 268, "less error or outline"));
+    sqlite3_close(db);
+
+    db = memory_terrain(40, 33, K, true); /* the root's centre has one, and its north-east corner must */
+    edit_block(db, 1, K, outline_of_root_corner, test_quantum);
+    assert_int_equal(check_terrain(db, &f), SQLITE_OK);
+    assert_true(has_finding(&f, 1, "less error or outline than one that depends on it: at (64,0)"));
     sqlite3_close(db);
 }
 

@@ -288,7 +288,6 @@ static void a_damaged_terrain_gives_an_error_or_the_right_answer(void **state) {
         "UPDATE rqt_index_1_node SET data = zeroblob(length(data))",
         "UPDATE rqt_index_1_node SET data = randomblob(10)",
         "DELETE FROM rqt_index_1_node",
-        "UPDATE rqt_terrain SET width = 20",
         "UPDATE rqt_terrain SET k = 3",
         "UPDATE rqt_terrain SET width = 400, height = 300",
         /* from here on harmless: too much is found, and what is too much is not used */

@@ -294,8 +294,7 @@ static void check_inside(check *c, frame *f) {
                 const ptrdiff_t above = place_in(f, parents[p]);
                 if (above < 0) continue;
                 const int outline = f->block.flags[i] & ~f->block.flags[above] & RQT_OUTLINE;
-                if (f->block.error[above] < error || (outline && !is_root_corner(lattice, parents[p])))
-                    count(&found.unsaturated, parents[p]);
+                if (f->block.error[above] < error || outline) count(&found.unsaturated, parents[p]);
                 check_triangle(c, f, at, parents[p], &found);
             }
         }

@@ -139,8 +139,8 @@ static bool read_mesh(const uint8_t *bytes, size_t size, int kind, frame *at, mu
                   .dy = read_double(bytes + 56),
                   .z0 = (int64_t)read64(bytes + 64),
                   .d = (int32_t)read32(bytes + 72),
-                  .f = read_double(bytes + 88) * (double)(int32_t)read32(bytes + 76) /
-                       (double)(int32_t)read32(bytes + 80),
+                  .f = read_double(bytes + 88) *
+                       ((double)(int32_t)read32(bytes + 76) / (double)(int32_t)read32(bytes + 80)),
                   .o = read_double(bytes + 96),
                   .srid = (int32_t)read32(bytes + 84)};
     const bool mirrored = at->dx * at->dy < 0;
