@@ -73,6 +73,8 @@ def import_terrain(database, *sources, **options):
     """rqt import; options as name="x", block=3, replace=True."""
     command = [RQT, "import"]
     for key, value in options.items():
+        if value is False:
+            continue
         command.append("--" + key.replace("_", "-"))
         if value is not True:
             command.append(str(value))

@@ -289,7 +289,6 @@ static void a_damaged_terrain_gives_an_error_or_the_right_answer(void **state) {
         "UPDATE rqt_index_1_node SET data = randomblob(10)",
         "DELETE FROM rqt_index_1_node",
         "UPDATE rqt_terrain SET k = 3",
-        "UPDATE rqt_terrain SET width = 400, height = 300",
         /* from here on harmless: too much is found, and what is too much is not used */
         "UPDATE rqt_index_1 SET x0 = 0, x1 = 39, y0 = 0, y1 = 32",
         "UPDATE rqt_index_1 SET x0 = -2147483648, x1 = 2147483647",
@@ -439,9 +438,9 @@ static void absurd_rows_crash_nothing(void **state) {
                     CHECK(a.code == SQLITE_OK || a.error[0], "%s = %s: no sentence", columns[c], values[v]);
                 }
                 assert_int_equal(store_find(s, NULL, &t, &error), SQLITE_OK);
-                (void)store_window(s, t, t->lattice.width - 1, t->lattice.height - 1, 1, 1, q, valid, &error);
-                (void)store_height(s, t, 1003, 1998, -1, &metres, &found, &error);
-                (void)store_height(s, t, 1003, 1998, 1, &metres, &found, &error);
+                (void)store_window(s, t, t->lattice.width - 1, t->lattice.height - 1, 1, 1, q, valid, NULL);
+                (void)store_height(s, t, 1003, 1998, -1, &metres, &found, NULL);
+                (void)store_height(s, t, 1003, 1998, 1, &metres, &found, NULL);
                 /* sizes that are right for other terrains make check look for a million blocks: let it stop soon */
                 findings f = {.most = 20};
                 (void)store_check(s, t, add_finding, &f, &error);
@@ -603,6 +602,62 @@ static void an_interrupt_stops_a_query_and_leaves_nothing_behind(void **state) {
     assert_int_equal(sqlite3_close(db), SQLITE_OK);
 }
 
+static struct {
+    int countdown;
+    sqlite3 *theirs;
+} foreign;
+
+/* Commits new blocks through the other connection, once. */
+static int commit_soon(void *context) {
+    (void)context;
+    if (--foreign.countdown == 0)
+        run(foreign.theirs,
+            "BEGIN; DELETE FROM rqt_block_1; INSERT INTO rqt_block_1 SELECT * FROM fresh.rqt_block_1;"
+            "DELETE FROM rqt_index_1; INSERT INTO rqt_index_1 SELECT * FROM fresh.rqt_index_1; COMMIT");
+    return 0;
+}
+
+/* Without a transaction of the caller's: a query still is one moment, or an error. */
+static void a_commit_in_the_middle_of_a_query_is_not_mixed_in(void **state) {
+    (void)state;
+    char path[2][128];
+    for (uint32_t n = 0; n < 2; n++) {
+        sqlite3 *db = open_database(scratch_file(path[n], n ? "fresh.db" : "mixed.db"));
+        assert_string_equal(ask(db, "PRAGMA journal_mode = wal"), "wal");
+        put_terrain(db, "t", 18, 7, 2, n + 1, false);
+        sqlite3_close(db);
+    }
+    sqlite3 *fresh_db = open_database(path[1]), *old_db = open_database(":memory:");
+    put_terrain(old_db, "t", 18, 7, 2, 1, false);
+    const answer old = query_database(old_db, 0, by_threshold), fresh = query_database(fresh_db, 0, by_threshold);
+    sqlite3_close(old_db);
+    sqlite3_close(fresh_db);
+    int mixed = 0, n = 1;
+    for (;; n += 1 + n / 16) {
+        char copy[128];
+        sqlite3 *db = open_database(scratch_file(copy, "copy.db"));
+        assert_string_equal(ask(db, "PRAGMA journal_mode = wal"), "wal");
+        put_terrain(db, "t", 18, 7, 2, 1, false);
+        foreign.theirs = open_database(copy);
+        run(foreign.theirs, "ATTACH %Q AS fresh", path[1]);
+        foreign.countdown = n;
+        store *s;
+        assert_int_equal(store_open(db, &s), SQLITE_OK);
+        sqlite3_progress_handler(db, 1, commit_soon, NULL);
+        const answer a = query_store(s, "t", 0, by_threshold, NULL);
+        sqlite3_progress_handler(db, 0, NULL, NULL);
+        mixed += a.code == SQLITE_OK && !same_answer(&a, &old) && !same_answer(&a, &fresh);
+        store_close(s);
+        assert_int_equal(sqlite3_close(db), SQLITE_OK);
+        assert_int_equal(sqlite3_close(foreign.theirs), SQLITE_OK);
+        remove_database(copy);
+        if (foreign.countdown > 0) break;
+    }
+    for (int i = 0; i < 2; i++) remove_database(path[i]);
+    CHECK(n > 50, "the query takes no more than %d steps", n);
+    CHECK(mixed == 0, "%d answers are neither the old nor the new terrain", mixed);
+}
+
 /* ---------------------------------------------------------------------------------------- readers and writer */
 
 enum { VERSIONS = 25, READERS = 2 };
@@ -693,6 +748,7 @@ int main(void) {
         cmocka_unit_test(a_transaction_of_our_own_is_seen_and_its_rollback_too),
         cmocka_unit_test(vacuum_and_close_succeed_after_queries),
         cmocka_unit_test(an_interrupt_stops_a_query_and_leaves_nothing_behind),
+        cmocka_unit_test(a_commit_in_the_middle_of_a_query_is_not_mixed_in),
         cmocka_unit_test(two_readers_and_a_writer_never_see_half_a_terrain),
     };
     return cmocka_run_group_tests_name("store faults", tests, make_scratch, drop_scratch);

@@ -82,14 +82,16 @@ bool cli_proof_holds(const cli_proof *proof, double eps, double quantum_error);
 
 /* ------------------------------------------------------------------------------------------ text (text.c) -- */
 /* Texts of a ring of buffers: good for the arguments of one printf. */
-const char *cli_count(int64_t n);         /* 1 234 567 */
-const char *cli_real(double value);       /* 6 significant digits, no trailing zeros */
+const char *cli_count(int64_t n);                 /* 1 234 567 */
+const char *cli_real(double value);               /* 6 significant digits, no trailing zeros */
 const char *cli_place(double value, bool lonlat); /* a coordinate, to 0.1 m or better, no trailing zeros */
-const char *cli_length(double metres);    /* 850 m, 12.3 km */
-const char *cli_crs_name(const char *wkt); /* the name in a WKT, "none" when there is none */
+const char *cli_length(double metres);            /* 850 m, 12.3 km */
+const char *cli_crs_name(const char *wkt);        /* the name in a WKT, "none" when there is none */
+/* The same for people: "EPSG:26710" where the WKT has a code and no name worth showing. */
+const char *cli_crs_label(const store_terrain *terrain);
 
-/* A table of texts, columns aligned by what they hold. Memory that is missing makes it incomplete and cli_table_print
- * say so. */
+/* A table of texts, columns aligned by what they hold. Memory that is missing makes it incomplete and
+ * cli_table_print say so. */
 typedef struct cli_table {
     int columns, rows;
     const char *left; /* 'l' or 'r' per column */
@@ -123,8 +125,8 @@ typedef struct cli_output {
     const char *path;
     char temporary[4096];
 } cli_output;
-/* CLI_OK, or the exit status after a sentence: folders and the file `forbidden` are refused. The temporary file does
- * not exist yet. */
+/* CLI_OK, or the exit status after a sentence: folders and the file `forbidden` are refused. The temporary file
+ * does not exist yet. */
 int cli_output_begin(cli_output *output, const char *path, const char *forbidden);
 bool cli_output_write(const cli_output *output, const void *bytes, size_t size);
 bool cli_output_finish(cli_output *output); /* renames; discards when that fails */

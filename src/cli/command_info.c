@@ -16,7 +16,8 @@ static const char HELP[] =
     "Usage: rqt info [--json] DATABASE\n"
     "\n"
     "A table of the terrains: samples, cell size, heights and quantum in metres, voids, blocks, bytes, and the\n"
-    "largest error a vertex can have; then for each its extent, coordinate reference system and source.\n"
+    "largest error of a vertex (beside voids it counts the outline that would be lost without it). Then for each\n"
+    "its extent, coordinate reference system and source.\n"
     "\n"
     "Options:\n"
     "  --json          the same for programs: an array with an object for each terrain\n"
@@ -58,7 +59,9 @@ static bool read_figures(sqlite3 *db, const char *name, figures *f) {
     return code == SQLITE_ROW || code == SQLITE_DONE;
 }
 
-static double samples_of(const store_terrain *t) { return (double)t->lattice.width * t->lattice.height; }
+static double samples_of(const store_terrain *t) {
+    return (double)t->lattice.width * t->lattice.height;
+}
 
 /* West, south, east and north sample. */
 static void extent_of(const store_terrain *t, double box[4]) {
@@ -117,11 +120,13 @@ static void print_details(const store_terrain *t) {
     printf("  extent   x %s .. %s, y %s .. %s", cli_place(box[0], t->lonlat), cli_place(box[2], t->lonlat),
            cli_place(box[1], t->lonlat), cli_place(box[3], t->lonlat));
     if (*t->crs)
-        printf(" (%s x %s)", cli_length(across * (t->lattice.width - 1)), cli_length(down * (t->lattice.height - 1)));
+        printf(" (%s x %s)", cli_length(across * (t->lattice.width - 1)),
+               cli_length(down * (t->lattice.height - 1)));
     printf("\n  cell     %.10g x %.10g%s\n", fabs(t->placement.dx), fabs(t->placement.dy),
            t->lonlat ? " degrees" : "");
-    printf("  CRS      %s", cli_crs_name(t->crs));
-    if (t->srid) printf(" (SRID %d)", t->srid);
+    const char *crs = cli_crs_label(t);
+    printf("  CRS      %s", crs);
+    if (t->srid && strncmp(crs, "EPSG:", 5)) printf(" (SRID %d)", t->srid);
     if (*t->vertical) printf(", heights above %s", t->vertical);
     printf("\n  blocks   of %d x %d samples\n", (1 << t->k) + 1, (1 << t->k) + 1);
     if (t->quantum_error > 0) printf("  rounded  by at most %s m on import\n", cli_real(t->quantum_error));
@@ -144,8 +149,8 @@ static cJSON *object_of(const store_terrain *t, const figures *f) {
     cJSON_AddStringToObject(o, "vertical", t->vertical);
     cJSON_AddNumberToObject(o, "width", t->lattice.width);
     cJSON_AddNumberToObject(o, "height", t->lattice.height);
-    cJSON_AddNumberToObject(o, "cell_x", t->placement.dx);
-    cJSON_AddNumberToObject(o, "cell_y", t->placement.dy);
+    cJSON_AddNumberToObject(o, "cell_x", fabs(t->placement.dx));
+    cJSON_AddNumberToObject(o, "cell_y", fabs(t->placement.dy));
     cJSON_AddItemToObject(o, "extent", cJSON_CreateDoubleArray(box, 4));
     if (f->has_heights) {
         cJSON_AddNumberToObject(o, "min_z", f->min_z);

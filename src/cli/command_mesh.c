@@ -37,14 +37,11 @@ static const char HELP[] =
 
 enum { DEFAULT_WIDTH = 1800, LEAST_WIDTH = 1200, LARGEST_WIDTH = 12000 };
 
-static const struct option OPTIONS[] = {{"eps", required_argument, NULL, 'e'},
-                                        {"region", required_argument, NULL, 'r'},
-                                        {"terrain", required_argument, NULL, 't'},
-                                        {"mode", required_argument, NULL, 'm'},
-                                        {"output", required_argument, NULL, 'o'},
-                                        {"width", required_argument, NULL, 'w'},
-                                        {"help", no_argument, NULL, 'h'},
-                                        {NULL, 0, NULL, 0}};
+static const struct option OPTIONS[] = {
+    {"eps", required_argument, NULL, 'e'},     {"region", required_argument, NULL, 'r'},
+    {"terrain", required_argument, NULL, 't'}, {"mode", required_argument, NULL, 'm'},
+    {"output", required_argument, NULL, 'o'},  {"width", required_argument, NULL, 'w'},
+    {"help", no_argument, NULL, 'h'},          {NULL, 0, NULL, 0}};
 
 typedef enum kind { NO_KIND, OBJ, PLY, GPKG, SVG, PNG } kind;
 
@@ -138,7 +135,8 @@ static int set_option(request *r, int option) {
         return CLI_OK;
     case 'w':
         if (!cli_integer(optarg, LEAST_WIDTH, LARGEST_WIDTH, &n))
-            return cli_usage("--width %s: a whole number of pixels from %d to %d", optarg, LEAST_WIDTH, LARGEST_WIDTH);
+            return cli_usage("--width %s: a whole number of pixels from %d to %d", optarg, LEAST_WIDTH,
+                             LARGEST_WIDTH);
         r->width = (int)n;
         return CLI_OK;
     default:
@@ -160,7 +158,8 @@ static int run(int argc, char **argv) {
     if (!r.output) return cli_usage("-o is missing: the file to write");
     if ((r.kind = kind_of(r.output)) == NO_KIND) return CLI_USAGE;
     if (r.count > 1 && r.kind != SVG && r.kind != PNG)
-        return cli_usage("%s holds one mesh, so --eps takes one number here; a list is for .svg and .png", r.output);
+        return cli_usage("%s holds one mesh, so --eps takes one number here; a list is for .svg and .png",
+                         r.output);
     char *region = NULL;
     if (r.region && !(region = cli_region(r.region))) return CLI_USAGE;
     sqlite3 *db = cli_open(r.database);

@@ -11,7 +11,8 @@ static const char HELP[] =
     "Usage: rqt verify DATABASE --eps E [--region R] [--terrain T]\n"
     "\n"
     "Makes the mesh, lays its triangles over all full-resolution samples with code that knows nothing of how the\n"
-    "mesh was made, and reports the true error and every crack. Exit status 1 when a mesh is further than eps from\n"
+    "mesh was made, and reports the true error and every crack. Exit status 1 when a mesh is further than eps "
+    "from\n"
     "a sample, has a T-junction or an overlap, or leaves a sample uncovered.\n"
     "\n"
     "Options:\n"
@@ -38,9 +39,9 @@ static const struct option OPTIONS[] = {{"eps", required_argument, NULL, 'e'},
  * failed. */
 static bool verify(sqlite3 *db, const char *region, const double *eps, int count, const char *name,
                    const store_terrain *t) {
-    static const char *const heads[] = {"eps",       "samples", "vertices", "triangles", "share", "max error",
-                                        "rms error", "at x",    "at y",     "T-junctions", "overlaps", "uncovered",
-                                        "verdict"};
+    static const char *const heads[] = {"eps",       "samples",   "vertices", "triangles", "share",
+                                        "max error", "rms error", "at x",     "at y",      "T-junctions",
+                                        "overlaps",  "uncovered", "verdict"};
     bool all_hold = true, answered = true;
     cli_table table;
     cli_table_begin(&table, 13, "rrrrrrrrrrrrl");

@@ -120,9 +120,9 @@ bool cli_verify(sqlite3 *db, const char *region, double eps, const char *terrain
     return code == SQLITE_ROW;
 }
 
-/* The promise: nowhere further than max(eps, quantum_error) from a sample of the source. The stored heights are within
- * quantum_error of the source's, and the mesh within eps - quantum_error of them, or exactly on them. The verifier
- * multiplies by a quantum that is itself rounded: an equality may be two units of the last place off. */
+/* The promise: nowhere further than max(eps, quantum_error) from a sample of the source. The stored heights are
+ * within quantum_error of the source's, and the mesh within eps - quantum_error of them, or exactly on them. The
+ * verifier multiplies by a quantum that is itself rounded: an equality may be two units of the last place off. */
 bool cli_proof_holds(const cli_proof *proof, double eps, double quantum_error) {
     const double allowed = fmax(eps - quantum_error, 0) * (1 + 0x1p-51);
     return proof->max_error <= allowed && !proof->t_junctions && !proof->overlaps && !proof->uncovered;

@@ -1,7 +1,7 @@
 /* main.c - the rqt command: which command is meant, and how it speaks.
  *
- * Every sentence on stderr begins with the command that says it ("rqt mesh: ..."), so that it can be placed in the log
- * of a script that calls several.
+ * Every sentence on stderr begins with the command that says it ("rqt mesh: ..."), so that it can be placed in the
+ * log of a script that calls several.
  */
 #include "cli.h"
 #include "import.h"
@@ -90,7 +90,8 @@ static const cli_command *find(const char *name) {
 static int dispatch(int argc, char **argv) {
     if (argc < 2) return cli_usage("a command is missing: import, info, check, verify or mesh");
     const char *name = argv[1];
-    if (!strcmp(name, "--help") || !strcmp(name, "-h") || (!strcmp(name, "help") && argc == 2)) return help_of_all();
+    if (!strcmp(name, "--help") || !strcmp(name, "-h") || (!strcmp(name, "help") && argc == 2))
+        return help_of_all();
     if (!strcmp(name, "--version") || !strcmp(name, "-V") || !strcmp(name, "version")) return version();
     const bool help = !strcmp(name, "help");
     if (help) name = argv[2];

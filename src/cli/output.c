@@ -11,7 +11,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/* What the signal handler removes: only unlink and raise, which are safe there. An SQLite file may have a journal. */
+/* What the signal handler removes: only unlink and raise, which are safe there. An SQLite file may have a journal.
+ */
 static char signal_file[4096], signal_journal[4112];
 
 static void remove_and_die(int number) {
@@ -40,8 +41,7 @@ int cli_output_begin(cli_output *output, const char *path, const char *forbidden
             return cli_usage("%s is the database itself; -o names another file", path);
         }
     }
-    const int length =
-        snprintf(output->temporary, sizeof output->temporary, "%s.part-%ld", path, (long)getpid());
+    const int length = snprintf(output->temporary, sizeof output->temporary, "%s.part-%ld", path, (long)getpid());
     if (length < 0 || (size_t)length >= sizeof output->temporary) {
         return cli_fail("the file name is too long");
     }

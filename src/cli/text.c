@@ -61,9 +61,18 @@ const char *cli_length(double metres) {
 
 const char *cli_crs_name(const char *wkt) {
     const char *start = strchr(wkt, '"'), *end = start ? strchr(start + 1, '"') : NULL;
-    if (!end) return *wkt ? "unnamed" : "none";
+    if (!*wkt) return "none";
+    if (!end || end == start + 1) return "unnamed";
     char *text = next_text();
     snprintf(text, 64, "%.*s", (int)(end - start - 1), start + 1);
+    return text;
+}
+
+const char *cli_crs_label(const store_terrain *t) {
+    const char *name = cli_crs_name(t->crs);
+    if (t->srid <= 0 || (strcmp(name, "unnamed") && strcmp(name, "unknown"))) return name;
+    char *text = next_text();
+    snprintf(text, 64, "EPSG:%d", t->srid);
     return text;
 }
 
@@ -113,8 +122,8 @@ void cli_table_print(cli_table *table) {
     *table = (cli_table){0};
 }
 
-/* WGS 84 near enough for a size in kilometres and a scale bar; the CRS's own metres otherwise (cost.cell is metres of
- * the longer cell side). */
+/* WGS 84 near enough for a size in kilometres and a scale bar; the CRS's own metres otherwise (cost.cell is metres
+ * of the longer cell side). */
 void cli_ground(const store_terrain *t, int32_t row0, int32_t rows, double *per_column, double *per_row) {
     const double dx = fabs(t->placement.dx), dy = fabs(t->placement.dy);
     if (t->lonlat) {

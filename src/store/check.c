@@ -31,7 +31,6 @@ typedef struct frame {
     rqt_code em;
     bool outline;  /* one of those vertices has the outline bit */
     bool em_known; /* all blocks below could be read */
-    bool em_whole; /* and no child lies past the raster */
 } frame;
 
 typedef struct check {
@@ -434,7 +433,6 @@ static void check_index(check *c, const frame *f) {
 /* What a child adds to its parent's em: vertices of its grid that the parent's has not, and all below. */
 static void fold(frame *parent, const frame *f) {
     if (!f->has_block || !f->em_known) parent->em_known = false;
-    if (!f->em_whole) parent->em_whole = false;
     if (!parent->em_known) return;
     const int32_t n = (1 << f->block.k) + 1;
     rqt_code em = f->em > parent->em ? f->em : parent->em;
@@ -450,22 +448,16 @@ static void fold(frame *parent, const frame *f) {
     parent->outline = flags & RQT_OUTLINE;
 }
 
-/* Where a child lies past the raster its vertices are in no block, though some have errors, taken over from
- * vertices beyond the cell. Then em may be larger than what is seen, but never than the centre's error: all descend
- * from it. */
+/* Children past the raster are in no table, though their vertices can have errors, taken over from descendants on
+ * this side. But up to the column (or row) where such a child begins the lattice is its own mirror image: the same
+ * descendants are those of the mirrored vertex, in the child that is there. So nothing is missed. */
 static void check_em(check *c, const frame *f) {
     if (!f->em_known || !f->has_summary) return;
     const rqt_interval *stored[2] = {&f->summary.tol, &f->summary.exact};
     static const char *const names[] = {"tol", "exact"};
     for (int exact = 0; exact < 2; exact++) {
         const rqt_code seen = exact && f->outline ? RQT_CODE_INFINITY : f->em;
-        rqt_code most = seen;
-        if (!f->em_whole && f->has_block) {
-            const size_t n = ((size_t)1 << f->block.k) + 1, center = (n * n - 1) / 2;
-            const bool outline = exact && (f->block.flags[center] & RQT_OUTLINE);
-            most = outline ? RQT_CODE_INFINITY : f->block.error[center];
-        }
-        if (stored[exact]->em < seen || (stored[exact]->em > most && (f->em_whole || f->has_block)))
+        if (stored[exact]->em != seen)
             FOUND(c, f->number, "has em %d for outline %s; the blocks below say %d", stored[exact]->em,
                   names[exact], seen);
     }
@@ -474,13 +466,10 @@ static void check_em(check *c, const frame *f) {
 static void visit(check *c, int level, int32_t i, int32_t j) {
     frame *f = &c->frames[level], *parent = level > 0 ? f - 1 : NULL;
     f->number = rqt_block_number_of(level, i, j);
-    if (rqt_block_locate(&c->t->lattice, c->t->k, f->number, &f->place) != RQT_OK) {
-        if (parent) parent->em_whole = false;
-        return;
-    }
+    if (rqt_block_locate(&c->t->lattice, c->t->k, f->number, &f->place) != RQT_OK) return;
     f->em = 0;
     f->outline = false;
-    f->em_known = f->em_whole = true;
+    f->em_known = true;
     read_frame(c, f);
     if (f->has_block) {
         check_inside(c, f);

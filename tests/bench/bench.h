@@ -36,8 +36,8 @@ typedef struct bench_table {
 
 /* Opens the CSV file; NULL machine and data are not allowed. false: it cannot be written. */
 bool bench_table_open(bench_table *table, const char *csv, const char *machine, const char *data);
-/* A heading above the rows that follow. Columns: median, min, max, unit, ratio, aim. ratio: what it is of; "":
- * there are none; NULL: rows of counts, which need no names of columns. */
+/* A heading above the rows that follow. Columns: median, min, max, unit, runs, ratio, aim. ratio: what it is of;
+ * "": there are none; NULL: rows of counts, which need no names of columns. */
 void bench_table_section(bench_table *table, const char *section, const char *title, const char *ratio);
 /* One row: the times scaled into the unit (factor * value, or factor / value when inverse), and the ratio of its
  * median to the peer's, where there is one (inverse: of the rates). */

@@ -41,7 +41,7 @@ void bench_table_section(bench_table *table, const char *section, const char *ti
     table->section = section;
     printf("\n%s\n", title);
     if (ratio)
-        printf("  %-46s %10s %10s %10s  %-7s %9s%s\n", "", "median", "min", "max", "", ratio,
+        printf("  %-46s %10s %10s %10s  %-7s %5s %9s%s\n", "", "median", "min", "max", "", "runs", ratio,
                *ratio ? "  aim" : "");
 }
 
@@ -55,14 +55,16 @@ static const char *number(double value, char text[32]) {
 
 static void write_row(bench_table *table, const char *what, const char *unit, const bench_summary *s,
                       const char *peer_name, double ratio, bench_aim aim) {
-    char a[32], b[32], c[32], r[32] = "", wanted[48] = "";
+    char a[32], b[32], c[32], r[32] = "", wanted[48] = "", runs[16] = "";
     const bool met = aim.sense == BENCH_AT_MOST ? ratio <= aim.value : ratio >= aim.value;
     if (peer_name) snprintf(r, sizeof r, "%.2f", ratio);
     if (aim.sense != BENCH_NO_AIM)
         snprintf(wanted, sizeof wanted, "%s %g: %s", aim.sense == BENCH_AT_MOST ? "<=" : ">=", aim.value,
                  met ? "met" : "missed");
-    printf("  %-46s %10s %10s %10s  %-7s %9s  %s\n", what, number(s->median, a),
-           s->runs > 1 ? number(s->low, b) : "", s->runs > 1 ? number(s->high, c) : "", unit, r, wanted);
+    const bool many = s->runs > 1;
+    if (many) snprintf(runs, sizeof runs, "%d", s->runs);
+    printf("  %-46s %10s %10s %10s  %-7s %5s %9s  %s\n", what, number(s->median, a), many ? number(s->low, b) : "",
+           many ? number(s->high, c) : "", unit, runs, r, wanted);
     fprintf(table->csv, "%s,\"%s\",%s,%d,%.9g,%.9g,%.9g,\"%s\",", table->section, what, unit, s->runs, s->median,
             s->low, s->high, peer_name ? peer_name : "");
     if (peer_name) fprintf(table->csv, "%.6g", ratio);

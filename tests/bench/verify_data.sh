@@ -40,7 +40,7 @@ done
 
 passed=0 failed=0 skipped=0
 for file in "${files[@]}"; do
-    echo "$(basename "$file")"
+    basename "$file"
     rm -f "$work"/t.gpkg*
     if ! "$RQT" import --name t "$file" "$work/t.gpkg" >"$work/log.txt" 2>&1; then
         skipped=$((skipped + 1))
