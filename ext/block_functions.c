@@ -1,10 +1,12 @@
-/* block_functions.c - looking into one block's bytes: rqt_block_info (header), _check (everything), _dump (text). */
+/* block_functions.c - looking into one block's bytes: rqt_block_info (header), _check (everything), _dump (text).
+ */
 #include "functions.h"
 
 #include <string.h>
 
 /* The BLOB of the only argument; false when it has been answered (NULL, or no BLOB). */
-static bool take_blob(sqlite3_context *result, const char *name, sqlite3_value *value, const uint8_t **bytes, size_t *size) {
+static bool take_blob(sqlite3_context *result, const char *name, sqlite3_value *value, const uint8_t **bytes,
+                      size_t *size) {
     if (sqlite3_value_type(value) == SQLITE_NULL) return false;
     if (sqlite3_value_type(value) != SQLITE_BLOB) {
         char *error = NULL;
@@ -27,12 +29,13 @@ static void result_text(sqlite3_context *result, sqlite3_str *text) {
 }
 
 static void append_header(sqlite3_str *out, const rqt_block_header *h, size_t size) {
-    sqlite3_str_appendf(out,
-                        "{\"version\":%d,\"k\":%d,\"width\":%d,\"height\":%d,\"voids\":\"%s\",\"outline\":%s,"
-                        "\"height_planes\":%d,\"error_planes\":%d,\"quantum\":%!.17g,\"payload\":%lld,\"bytes\":%lld}",
-                        h->version, h->k, h->width, h->height, h->all_void ? "all" : (h->has_voids ? "some" : "none"),
-                        h->has_outline ? "true" : "false", h->height_planes, h->error_planes, h->quantum,
-                        (sqlite3_int64)h->payload, (sqlite3_int64)size);
+    sqlite3_str_appendf(
+        out,
+        "{\"version\":%d,\"k\":%d,\"width\":%d,\"height\":%d,\"voids\":\"%s\",\"outline\":%s,"
+        "\"height_planes\":%d,\"error_planes\":%d,\"quantum\":%!.17g,\"payload\":%lld,\"bytes\":%lld}",
+        h->version, h->k, h->width, h->height, h->all_void ? "all" : (h->has_voids ? "some" : "none"),
+        h->has_outline ? "true" : "false", h->height_planes, h->error_planes, h->quantum, (sqlite3_int64)h->payload,
+        (sqlite3_int64)size);
 }
 
 void call_block_info(sqlite3_context *result, int count, sqlite3_value **arguments) {
@@ -79,7 +82,10 @@ static void append_grid(sqlite3_str *out, const char *title, const rqt_block *b,
             else if (what == 1 && b->error[i] == RQT_CODE_INFINITY)
                 sqlite3_str_appendf(out, "%sinf", gap);
             else
-                sqlite3_str_appendf(out, "%s%d", gap, what == 0 ? b->q[i] : what == 1 ? b->error[i] : !!(b->flags[i] & RQT_OUTLINE));
+                sqlite3_str_appendf(out, "%s%d", gap,
+                                    what == 0   ? b->q[i]
+                                    : what == 1 ? b->error[i]
+                                                : !!(b->flags[i] & RQT_OUTLINE));
         }
         sqlite3_str_appendall(out, "\n");
     }

@@ -1,8 +1,9 @@
 /* connection.c - what rqt keeps per connection, and how it lets the connection close.
  *
- * The store keeps prepared statements, and sqlite3_close refuses while there are any. SQLite disconnects virtual tables
- * before it looks, so the statements belong to one of ours, rqt_terrains: as long as it is connected they may stay, and when
- * it is disconnected they go. A scalar function that comes first connects it by preparing a statement on it.
+ * The store keeps prepared statements, and sqlite3_close refuses while there are any. SQLite disconnects virtual
+ * tables before it looks, so the statements belong to one of ours, rqt_terrains: as long as it is connected they
+ * may stay, and when it is disconnected they go. A scalar function that comes first connects it by preparing a
+ * statement on it.
  */
 #include "functions.h"
 
@@ -22,9 +23,13 @@ connection *connection_create(sqlite3 *db) {
     return c;
 }
 
-sqlite3 *connection_db(const connection *c) { return c->db; }
+sqlite3 *connection_db(const connection *c) {
+    return c->db;
+}
 
-void connection_hold(connection *c) { c->holders++; }
+void connection_hold(connection *c) {
+    c->holders++;
+}
 
 void connection_release(void *p) {
     connection *c = p;

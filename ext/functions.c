@@ -1,8 +1,8 @@
 /* functions.c - the table of all SQL functions. What stands here is registered, helped with, documented and tested.
  *
- * Purity. Functions of their arguments alone are deterministic; those that read terrains are not, for terrains change. All
- * are innocuous: they read this connection's own databases, never a file of their own, and write nothing; so views on
- * them work with trusted_schema off. The examples run in the demo database.
+ * Purity. Functions of their arguments alone are deterministic; those that read terrains are not, for terrains
+ * change. All are innocuous: they read this connection's own databases, never a file of their own, and write
+ * nothing; so views on them work with trusted_schema off. The examples run in the demo database.
  */
 #include "functions.h"
 
@@ -36,7 +36,8 @@ const function rqt_functions[] = {
     {.name = "rqt_terrains",
      .arguments = "",
      .returns = "name, srid, width, height, cell_x, cell_y, min_z, max_z, quantum, voids, blocks, bytes, max_error",
-     .purpose = "The terrains of this connection's databases. Heights, quantum and max_error in metres, cells in CRS units. "
+     .purpose = "The terrains of this connection's databases. Heights, quantum and max_error in metres, cells in "
+                "CRS units. "
                 "Hidden columns: where sample (0,0) lies, steps, block size, CRS, source.",
      .example = "SELECT name, width, height, min_z, max_z FROM rqt_terrains",
      .fill = fill_terrains,
@@ -45,7 +46,8 @@ const function rqt_functions[] = {
     {.name = "rqt_range",
      .arguments = MESH,
      .returns = "x, y, z, error, level",
-     .purpose = "The vertices of the mesh of a region, each once. error: the stored saturated error in metres, infinite at the "
+     .purpose = "The vertices of the mesh of a region, each once. error: the stored saturated error in metres, "
+                "infinite at the "
                 "root's corners; level 0 is the coarsest.",
      .example = "SELECT count(*) FROM rqt_range(" SUMMIT ", 10)",
      .fill = fill_range,
@@ -59,14 +61,16 @@ const function rqt_functions[] = {
     {.name = "rqt_strip",
      .arguments = MESH,
      .returns = "seq, x, y, z",
-     .purpose = "The same triangles as one generalized strip: triangle i is rows i, i+1, i+2, its last two swapped for odd i; a "
+     .purpose = "The same triangles as one generalized strip: triangle i is rows i, i+1, i+2, its last two swapped "
+                "for odd i; a "
                 "triangle with two equal vertices is a join.",
      .example = "SELECT count(*) FROM rqt_strip(" SUMMIT ", 10)",
      .fill = fill_strip},
     {.name = "rqt_mesh",
      .arguments = "region, eps, format [, terrain [, options]]",
      .returns = "BLOB, TEXT for obj",
-     .purpose = "The mesh of a region as a file's bytes; format: strip, indexed (src/core/FORMAT.md), obj, ply, wkb, gpkg, "
+     .purpose = "The mesh of a region as a file's bytes; format: strip, indexed (src/core/FORMAT.md), obj, ply, "
+                "wkb, gpkg, "
                 "spatialite.",
      .example = "SELECT length(rqt_mesh(" SUMMIT ", 10, 'ply'))",
      .call = call_mesh,
@@ -76,8 +80,10 @@ const function rqt_functions[] = {
     {.name = "rqt_verify",
      .arguments = MESH,
      .returns = "samples, vertices, triangles, max_error, rms_error, x, y, t_junctions, overlaps, uncovered, area",
-     .purpose = "Proves the mesh of a region: rasterises its triangles over the full-resolution samples. max_error in metres, at "
-                "x, y; uncovered: samples inside the region that the outline promises and no triangle covers; area in CRS units "
+     .purpose = "Proves the mesh of a region: rasterises its triangles over the full-resolution samples. max_error "
+                "in metres, at "
+                "x, y; uncovered: samples inside the region that the outline promises and no triangle covers; area "
+                "in CRS units "
                 "squared.",
      .example = "SELECT max_error <= 10, t_junctions, overlaps, uncovered FROM rqt_verify(" SUMMIT ", 10)",
      .fill = fill_verify,
@@ -85,7 +91,8 @@ const function rqt_functions[] = {
     {.name = "rqt_explain",
      .arguments = MESH,
      .returns = "level, extent, why, bytes, cached, selected",
-     .purpose = "What a query reads: one row per block that answers, in the order of the walk. bytes is 0 where the index row "
+     .purpose = "What a query reads: one row per block that answers, in the order of the walk. bytes is 0 where "
+                "the index row "
                 "alone was enough.",
      .example = "SELECT level, count(*), sum(bytes) FROM rqt_explain(" SUMMIT ", 10) GROUP BY level",
      .fill = fill_explain,
@@ -93,7 +100,8 @@ const function rqt_functions[] = {
     {.name = "rqt_height",
      .arguments = "x, y [, eps [, terrain]]",
      .returns = "REAL",
-     .purpose = "The height in metres at a place of the terrain's CRS, on the full-resolution mesh or the one of eps; NULL over "
+     .purpose = "The height in metres at a place of the terrain's CRS, on the full-resolution mesh or the one of "
+                "eps; NULL over "
                 "void or outside.",
      .example = "SELECT rqt_height(-71.3033, 44.2705)",
      .call = call_height,

@@ -12,7 +12,8 @@
 typedef struct connection connection;
 
 sqlite3 *connection_db(const connection *c);
-/* The store, ready for use. Pair with connection_done, which lets go of what could keep the database from closing. */
+/* The store, ready for use. Pair with connection_done, which lets go of what could keep the database from closing.
+ */
 int connection_store(connection *c, store **s, char **error);
 void connection_done(connection *c);
 
@@ -25,8 +26,8 @@ typedef struct row_set {
     void (*release)(void *data); /* may be NULL */
 } row_set;
 
-/* Fill rows from the arguments (missing optional ones are NULL pointers); on failure *error is a sentence without the
- * function's name. */
+/* Fill rows from the arguments (missing optional ones are NULL pointers); on failure *error is a sentence without
+ * the function's name. */
 typedef int fill_rows(connection *c, sqlite3_value **arguments, row_set *rows, char **error);
 
 typedef void scalar_call(sqlite3_context *result, int count, sqlite3_value **arguments);
@@ -85,9 +86,9 @@ int options_read(const char *json, store_query_options *options, char **error);
 int fail(char **error, const char *format, ...);
 
 /* The functions themselves, by file. */
-fill_rows fill_range, fill_triangles, fill_strip;                     /* mesh_tables.c */
+fill_rows fill_range, fill_triangles, fill_strip;                          /* mesh_tables.c */
 fill_rows fill_terrains, fill_explain, fill_verify, fill_check, fill_help; /* insight_tables.c, verify_table.c */
 scalar_call call_version, call_build_info, call_bbox, call_circle, call_mesh, call_height; /* scalar.c */
-scalar_call call_block_info, call_block_check, call_block_dump;       /* block_functions.c */
+scalar_call call_block_info, call_block_check, call_block_dump;                            /* block_functions.c */
 
 #endif

@@ -18,44 +18,90 @@ static void release_terrains(void *data) {
     sqlite3_free(list);
 }
 
-static void text(sqlite3_context *result, const char *value) { sqlite3_result_text(result, value, -1, SQLITE_TRANSIENT); }
+static void text(sqlite3_context *result, const char *value) {
+    sqlite3_result_text(result, value, -1, SQLITE_TRANSIENT);
+}
 
 static void terrains_column(void *data, size_t row, int column, sqlite3_context *result) {
     const store_terrain *t = &((terrain_list *)data)->rows[row];
     const double a = rqt_unit_metres(&t->unit, t->min_q), b = rqt_unit_metres(&t->unit, t->max_q);
     const bool has_heights = t->voids < (int64_t)t->lattice.width * t->lattice.height;
     switch (column) {
-    case 0: text(result, t->name); break;
+    case 0:
+        text(result, t->name);
+        break;
     case 1:
         if (t->srid) sqlite3_result_int(result, t->srid);
         break;
-    case 2: sqlite3_result_int(result, t->lattice.width); break;
-    case 3: sqlite3_result_int(result, t->lattice.height); break;
-    case 4: sqlite3_result_double(result, fabs(t->placement.dx)); break;
-    case 5: sqlite3_result_double(result, fabs(t->placement.dy)); break;
+    case 2:
+        sqlite3_result_int(result, t->lattice.width);
+        break;
+    case 3:
+        sqlite3_result_int(result, t->lattice.height);
+        break;
+    case 4:
+        sqlite3_result_double(result, fabs(t->placement.dx));
+        break;
+    case 5:
+        sqlite3_result_double(result, fabs(t->placement.dy));
+        break;
     case 6:
         if (has_heights) sqlite3_result_double(result, a < b ? a : b);
         break;
     case 7:
         if (has_heights) sqlite3_result_double(result, a < b ? b : a);
         break;
-    case 8: sqlite3_result_double(result, fabs(rqt_unit_factor(&t->unit)) / (double)t->unit.d); break;
-    case 9: sqlite3_result_int64(result, t->voids); break;
-    case 10: sqlite3_result_int64(result, t->blocks); break;
-    case 11: sqlite3_result_int64(result, t->bytes); break;
-    case 12: sqlite3_result_double(result, rqt_code_metres(t->max_error)); break;
-    case 13: text(result, t->schema); break;
-    case 14: sqlite3_result_int(result, t->complete); break;
-    case 15: sqlite3_result_double(result, t->placement.x0); break;
-    case 16: sqlite3_result_double(result, t->placement.y0); break;
-    case 17: sqlite3_result_double(result, t->placement.dx); break;
-    case 18: sqlite3_result_double(result, t->placement.dy); break;
-    case 19: sqlite3_result_int(result, t->k); break;
-    case 20: sqlite3_result_double(result, t->quantum_error); break;
-    case 21: text(result, t->crs); break;
-    case 22: text(result, t->vertical); break;
-    case 23: text(result, t->source); break;
-    default: text(result, t->created); break;
+    case 8:
+        sqlite3_result_double(result, fabs(rqt_unit_factor(&t->unit)) / (double)t->unit.d);
+        break;
+    case 9:
+        sqlite3_result_int64(result, t->voids);
+        break;
+    case 10:
+        sqlite3_result_int64(result, t->blocks);
+        break;
+    case 11:
+        sqlite3_result_int64(result, t->bytes);
+        break;
+    case 12:
+        sqlite3_result_double(result, rqt_code_metres(t->max_error));
+        break;
+    case 13:
+        text(result, t->schema);
+        break;
+    case 14:
+        sqlite3_result_int(result, t->complete);
+        break;
+    case 15:
+        sqlite3_result_double(result, t->placement.x0);
+        break;
+    case 16:
+        sqlite3_result_double(result, t->placement.y0);
+        break;
+    case 17:
+        sqlite3_result_double(result, t->placement.dx);
+        break;
+    case 18:
+        sqlite3_result_double(result, t->placement.dy);
+        break;
+    case 19:
+        sqlite3_result_int(result, t->k);
+        break;
+    case 20:
+        sqlite3_result_double(result, t->quantum_error);
+        break;
+    case 21:
+        text(result, t->crs);
+        break;
+    case 22:
+        text(result, t->vertical);
+        break;
+    case 23:
+        text(result, t->source);
+        break;
+    default:
+        text(result, t->created);
+        break;
     }
 }
 
@@ -93,7 +139,9 @@ static void explain_column(void *data, size_t row, int column, sqlite3_context *
     rqt_block_place p;
     if (rqt_block_locate(&e->lattice, e->k, read->number, &p) != RQT_OK) return;
     switch (column) {
-    case 0: sqlite3_result_int(result, p.level); break;
+    case 0:
+        sqlite3_result_int(result, p.level);
+        break;
     case 1: {
         const rqt_vertex far_corner = rqt_vertex_clamp(&e->lattice, (rqt_vertex){p.x + p.side, p.y + p.side});
         const rqt_placement *at = &e->placement;
@@ -102,7 +150,8 @@ static void explain_column(void *data, size_t row, int column, sqlite3_context *
         (void)format_double(at->x0 + far_corner.x * at->dx, x1);
         (void)format_double(at->y0 + far_corner.y * at->dy, y0);
         (void)format_double(at->y0 + p.y * at->dy, y1);
-        char *wkt = sqlite3_mprintf("POLYGON((%s %s, %s %s, %s %s, %s %s, %s %s))", x0, y0, x1, y0, x1, y1, x0, y1, x0, y0);
+        char *wkt =
+            sqlite3_mprintf("POLYGON((%s %s, %s %s, %s %s, %s %s, %s %s))", x0, y0, x1, y0, x1, y1, x0, y1, x0, y0);
         if (wkt)
             sqlite3_result_text(result, wkt, -1, sqlite3_free);
         else
@@ -113,10 +162,18 @@ static void explain_column(void *data, size_t row, int column, sqlite3_context *
         text(result, read->needs_bytes ? "answers eps; its centre is selected, so its bytes are walked"
                                        : "answers eps; nothing is selected inside, so its index row is enough");
         break;
-    case 3: sqlite3_result_int64(result, read->bytes); break;
-    case 4: sqlite3_result_int(result, read->cached); break;
-    case 5: sqlite3_result_int64(result, read->selected); break;
-    default: sqlite3_result_int64(result, (sqlite3_int64)read->number); break;
+    case 3:
+        sqlite3_result_int64(result, read->bytes);
+        break;
+    case 4:
+        sqlite3_result_int(result, read->cached);
+        break;
+    case 5:
+        sqlite3_result_int64(result, read->selected);
+        break;
+    default:
+        sqlite3_result_int64(result, (sqlite3_int64)read->number);
+        break;
     }
 }
 
@@ -172,7 +229,8 @@ static bool add_finding(void *context, const store_finding *found) {
         return false;
     }
     list->rows = rows;
-    rows[list->count++] = (finding){sqlite3_mprintf("%s", found->severity), sqlite3_mprintf("%s", found->message), found->block};
+    rows[list->count++] =
+        (finding){sqlite3_mprintf("%s", found->severity), sqlite3_mprintf("%s", found->message), found->block};
     return list->count < MOST_FINDINGS;
 }
 
@@ -204,7 +262,8 @@ int fill_check(connection *c, sqlite3_value **arguments, row_set *rows, char **e
         if (name && strcmp(name, terrains.rows[i].name) != 0) continue;
         checked++;
         if (!terrains.rows[i].complete) {
-            char *message = sqlite3_mprintf("terrain %s is incomplete: its import did not finish", terrains.rows[i].name);
+            char *message =
+                sqlite3_mprintf("terrain %s is incomplete: its import did not finish", terrains.rows[i].name);
             if (!message || !add_finding(list, &(store_finding){"warning", 0, message})) code = SQLITE_NOMEM;
             sqlite3_free(message);
             continue;
@@ -234,12 +293,24 @@ static void help_column(void *data, size_t row, int column, sqlite3_context *res
     (void)data;
     const function *f = &rqt_functions[row];
     switch (column) {
-    case 0: text(result, f->name); break;
-    case 1: text(result, f->call ? "scalar" : "table"); break;
-    case 2: text(result, f->arguments); break;
-    case 3: text(result, f->returns); break;
-    case 4: text(result, f->purpose); break;
-    default: text(result, f->example); break;
+    case 0:
+        text(result, f->name);
+        break;
+    case 1:
+        text(result, f->call ? "scalar" : "table");
+        break;
+    case 2:
+        text(result, f->arguments);
+        break;
+    case 3:
+        text(result, f->returns);
+        break;
+    case 4:
+        text(result, f->purpose);
+        break;
+    default:
+        text(result, f->example);
+        break;
     }
 }
 

@@ -25,7 +25,8 @@ static void put_coordinate(const mesh *m, uint32_t vertex, int which, sqlite3_co
 }
 
 /* The mesh of the arguments, not yet as rows. */
-static int make_mesh(connection *c, sqlite3_value **arguments, bool strip, row_set *rows, mesh **out, char **error) {
+static int make_mesh(connection *c, sqlite3_value **arguments, bool strip, row_set *rows, mesh **out,
+                     char **error) {
     request r;
     int code = request_read(c, arguments[0], arguments[1], arguments[2], arguments[3], &r, error);
     if (code != SQLITE_OK) return code;

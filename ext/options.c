@@ -1,4 +1,5 @@
-/* options.c - the JSON object of options: which keys and values the contract has, and which of them this version does. */
+/* options.c - the JSON object of options: which keys and values the contract has, and which of them this version
+ * does. */
 #include "functions.h"
 
 #include <cjson/cJSON.h>
@@ -38,7 +39,8 @@ static int read_one(const cJSON *item, store_query_options *options, char **erro
         if (strcmp(choices[i].key, item->string) == 0) c = &choices[i];
     if (!c) return fail(error, "unknown option \"%s\"", item->string);
     if (c->pending[0] == '*') return fail(error, "option \"%s\" is not in this version", c->key);
-    if (!cJSON_IsString(item)) return fail(error, "option \"%s\" must be a text: one of%s%s", c->key, c->done, c->pending);
+    if (!cJSON_IsString(item))
+        return fail(error, "option \"%s\" must be a text: one of%s%s", c->key, c->done, c->pending);
     const char *value = item->valuestring;
     if (holds(c->pending, value)) return fail(error, "option \"%s\":\"%s\" is not in this version", c->key, value);
     if (!holds(c->done, value))
@@ -59,7 +61,8 @@ int options_read(const char *json, store_query_options *options, char **error) {
     int code = cJSON_IsObject(root) ? SQLITE_OK : fail(error, "options must be a JSON object");
     for (const cJSON *item = root->child; item && code == SQLITE_OK; item = item->next) {
         for (const cJSON *other = item->next; other && code == SQLITE_OK; other = other->next)
-            if (strcmp(item->string, other->string) == 0) code = fail(error, "option \"%s\" is given twice", item->string);
+            if (strcmp(item->string, other->string) == 0)
+                code = fail(error, "option \"%s\" is given twice", item->string);
         if (code == SQLITE_OK) code = read_one(item, options, error);
     }
     cJSON_Delete(root);

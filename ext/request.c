@@ -31,7 +31,8 @@ static int read_region(request *r, sqlite3_value *value, char **error) {
     if (type == SQLITE_INTEGER || type == SQLITE_FLOAT)
         return fail(error, "region must be WKT text, a geometry or NULL; it is a number");
     if (type != SQLITE_NULL) {
-        const void *bytes = type == SQLITE_TEXT ? (const void *)sqlite3_value_text(value) : sqlite3_value_blob(value);
+        const void *bytes =
+            type == SQLITE_TEXT ? (const void *)sqlite3_value_text(value) : sqlite3_value_blob(value);
         const size_t n = (size_t)sqlite3_value_bytes(value);
         if (!bytes && n > 0) return SQLITE_NOMEM;
         rqt_message why = {""};
@@ -42,14 +43,16 @@ static int read_region(request *r, sqlite3_value *value, char **error) {
         const int32_t srid = rqt_geometry_srid(r->geometry);
         const store_terrain *t = r->terrain;
         if (srid != 0 && srid != t->srid && !(srid == 4326 && t->wgs84))
-            return fail(error,
-                        "region has SRID %d, terrain %s has SRID %d; transforming between them is not in this version",
-                        srid, t->name, t->srid);
+            return fail(
+                error,
+                "region has SRID %d, terrain %s has SRID %d; transforming between them is not in this version",
+                srid, t->name, t->srid);
     }
     const rqt_status status =
         rqt_region_create(r->geometry, &r->terrain->placement, &r->terrain->lattice, store_allocator(), &r->region);
     if (status == RQT_OK) return SQLITE_OK;
-    return status == RQT_NO_MEMORY ? SQLITE_NOMEM : fail(error, "region cannot be placed on terrain %s", r->terrain->name);
+    return status == RQT_NO_MEMORY ? SQLITE_NOMEM
+                                   : fail(error, "region cannot be placed on terrain %s", r->terrain->name);
 }
 
 int request_read(connection *c, sqlite3_value *region, sqlite3_value *eps, sqlite3_value *terrain,

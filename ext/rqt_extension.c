@@ -13,8 +13,8 @@ static int register_scalar(connection *c, const function *f) {
     int code = SQLITE_OK;
     for (int n = f->least; n <= f->most && code == SQLITE_OK; n++) {
         connection_hold(c);
-        code = sqlite3_create_function_v2(connection_db(c), f->name, n, SQLITE_UTF8 | f->flags, c, f->call, NULL, NULL,
-                                          connection_release);
+        code = sqlite3_create_function_v2(connection_db(c), f->name, n, SQLITE_UTF8 | f->flags, c, f->call, NULL,
+                                          NULL, connection_release);
     }
     return code;
 }

@@ -13,7 +13,7 @@ __declspec(dllexport)
 #else
 __attribute__((visibility("default")))
 #endif
-int sqlite3_rqt_init(sqlite3 *db, char **error, const sqlite3_api_routines *api);
+    int sqlite3_rqt_init(sqlite3 *db, char **error, const sqlite3_api_routines *api);
 #ifdef __cplusplus
 }
 #endif

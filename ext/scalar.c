@@ -34,14 +34,15 @@ void call_version(sqlite3_context *result, int count, sqlite3_value **arguments)
 
 void call_build_info(sqlite3_context *result, int count, sqlite3_value **arguments) {
     (void)count, (void)arguments;
-    char *info = sqlite3_mprintf("rqt %s, format %d, built with %s, SQLite %s (running %s), GeographicLib %s, zstd %s", RQT_VERSION,
-                                 RQT_FORMAT_VERSION,
+    char *info =
+        sqlite3_mprintf("rqt %s, format %d, built with %s, SQLite %s (running %s), GeographicLib %s, zstd %s",
+                        RQT_VERSION, RQT_FORMAT_VERSION,
 #ifdef __clang__
-                                 "clang " __clang_version__,
+                        "clang " __clang_version__,
 #else
-                                 "gcc " __VERSION__,
+                        "gcc " __VERSION__,
 #endif
-                                 SQLITE_VERSION, sqlite3_libversion(), geo_version(), ZSTD_versionString());
+                        SQLITE_VERSION, sqlite3_libversion(), geo_version(), ZSTD_versionString());
     if (info)
         sqlite3_result_text(result, info, -1, sqlite3_free);
     else
@@ -152,7 +153,8 @@ void call_mesh(sqlite3_context *result, int count, sqlite3_value **arguments) {
     uint8_t *bytes = NULL;
     size_t size = 0;
     format_kind kind = FORMAT_OBJ;
-    const char *format = sqlite3_value_type(arguments[2]) == SQLITE_TEXT ? (const char *)sqlite3_value_text(arguments[2]) : "";
+    const char *format =
+        sqlite3_value_type(arguments[2]) == SQLITE_TEXT ? (const char *)sqlite3_value_text(arguments[2]) : "";
     const bool strip = strcmp(format, "strip") == 0, indexed = strcmp(format, "indexed") == 0;
     const bool other = !strip && !indexed && format_from_name(format, &kind);
     int code = SQLITE_OK;
@@ -161,8 +163,8 @@ void call_mesh(sqlite3_context *result, int count, sqlite3_value **arguments) {
     else if (!strip && !indexed && !other)
         code = fail(&error, "unknown format \"%s\"; there are strip indexed obj ply wkb gpkg spatialite", format);
     if (code == SQLITE_OK)
-        code = request_read(c, arguments[0], arguments[1], count > 3 ? arguments[3] : NULL, count > 4 ? arguments[4] : NULL,
-                            &r, &error);
+        code = request_read(c, arguments[0], arguments[1], count > 3 ? arguments[3] : NULL,
+                            count > 4 ? arguments[4] : NULL, &r, &error);
     if (code == SQLITE_OK) code = request_patch(&r, &patch, NULL, &error);
     if (code == SQLITE_OK)
         code = other ? other_format(&r, &patch, kind, &bytes, &size, &error)

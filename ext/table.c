@@ -1,9 +1,9 @@
 /* table.c - table-valued functions: one virtual table module for all of them.
  *
- * A function's columns come first, its arguments follow as hidden columns in order, then further hidden columns. The
- * planner must be able to give every argument that the call has: where it offers a plan in which one is not known yet
- * (the other table of a join comes later), that plan is refused and it finds another. A call without a required
- * argument is an error with a sentence.
+ * A function's columns come first, its arguments follow as hidden columns in order, then further hidden columns.
+ * The planner must be able to give every argument that the call has: where it offers a plan in which one is not
+ * known yet (the other table of a join comes later), that plan is refused and it finds another. A call without a
+ * required argument is an error with a sentence.
  */
 #include "functions.h"
 
@@ -128,8 +128,8 @@ static int best_index(sqlite3_vtab *base, sqlite3_index_info *info) {
         if (present & 1 << a) continue;
         char *name = argument_name(t->function, a);
         sqlite3_free(base->zErrMsg);
-        base->zErrMsg = sqlite3_mprintf("%s(): %s is missing; use %s(%s)", t->function->name, name, t->function->name,
-                                        t->function->arguments);
+        base->zErrMsg = sqlite3_mprintf("%s(): %s is missing; use %s(%s)", t->function->name, name,
+                                        t->function->name, t->function->arguments);
         sqlite3_free(name);
         return SQLITE_ERROR;
     }

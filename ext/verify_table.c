@@ -23,8 +23,8 @@ static bool is_valid(const window *w, int32_t col, int32_t row) {
     return w->valid[(size_t)(row - w->row) * (size_t)w->width + (size_t)(col - w->col)] != 0;
 }
 
-/* The outline's promise: a sample inside the region that is a corner of a unit half cell with three valid corners. The
- * window has a margin of one sample, so that all cells around are known. */
+/* The outline's promise: a sample inside the region that is a corner of a unit half cell with three valid corners.
+ * The window has a margin of one sample, so that all cells around are known. */
 static bool is_promised(void *context, int32_t col, int32_t row) {
     const window *w = context;
     if (!is_valid(w, col, row) || !rqt_region_contains(w->region, (rqt_vertex){col, row})) return false;
@@ -48,23 +48,45 @@ static void column(void *data, size_t row, int n, sqlite3_context *result) {
     const proof *p = data;
     const verify_report *r = &p->report;
     switch (n) {
-    case 0: sqlite3_result_int64(result, (sqlite3_int64)r->samples); break;
-    case 1: sqlite3_result_int64(result, (sqlite3_int64)r->vertices); break;
-    case 2: sqlite3_result_int64(result, (sqlite3_int64)r->triangles); break;
-    case 3: sqlite3_result_double(result, r->max_error); break;
-    case 4: sqlite3_result_double(result, r->rms_error); break;
+    case 0:
+        sqlite3_result_int64(result, (sqlite3_int64)r->samples);
+        break;
+    case 1:
+        sqlite3_result_int64(result, (sqlite3_int64)r->vertices);
+        break;
+    case 2:
+        sqlite3_result_int64(result, (sqlite3_int64)r->triangles);
+        break;
+    case 3:
+        sqlite3_result_double(result, r->max_error);
+        break;
+    case 4:
+        sqlite3_result_double(result, r->rms_error);
+        break;
     case 5:
         if (r->samples) sqlite3_result_double(result, p->x);
         break;
     case 6:
         if (r->samples) sqlite3_result_double(result, p->y);
         break;
-    case 7: sqlite3_result_int64(result, (sqlite3_int64)r->t_junctions); break;
-    case 8: sqlite3_result_int64(result, (sqlite3_int64)r->overlaps); break;
-    case 9: sqlite3_result_int64(result, (sqlite3_int64)r->uncovered); break;
-    case 10: sqlite3_result_double(result, r->area); break;
-    case 11: sqlite3_result_int64(result, (sqlite3_int64)r->void_touched); break;
-    default: sqlite3_result_int64(result, (sqlite3_int64)r->twice_area); break;
+    case 7:
+        sqlite3_result_int64(result, (sqlite3_int64)r->t_junctions);
+        break;
+    case 8:
+        sqlite3_result_int64(result, (sqlite3_int64)r->overlaps);
+        break;
+    case 9:
+        sqlite3_result_int64(result, (sqlite3_int64)r->uncovered);
+        break;
+    case 10:
+        sqlite3_result_double(result, r->area);
+        break;
+    case 11:
+        sqlite3_result_int64(result, (sqlite3_int64)r->void_touched);
+        break;
+    default:
+        sqlite3_result_int64(result, (sqlite3_int64)r->twice_area);
+        break;
     }
 }
 

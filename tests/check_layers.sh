@@ -52,7 +52,8 @@ inside=$(nm --defined-only "$BUILD/librqt.a" 2>/dev/null | awk 'NF==3 {print $3}
 outside=$(nm -u "$BUILD/librqt.a" | awk '$1=="U" {print $2}' | sort -u | comm -23 - <(echo "$inside") | grep -vE "$allowed" | tr '\n' ' ')
 say "$([ -z "$outside" ] && echo true)" "librqt.a needs libc's memory and text functions, libm and zstd only $outside"
 
-writable=$(nm "$BUILD/librqt.a" | awk 'NF==3 && $2 ~ /^[bBdDC]$/ {print $3}' | tr '\n' ' ')
+# .data.rel.ro holds constants with addresses in them, read-only once loaded.
+writable=$(objdump -t "$BUILD/librqt.a" | awk 'NF >= 5 && $(NF-2) ~ /^(\.data|\.bss|\*COM\*)/ && $(NF-2) !~ /^\.data\.rel\.ro/ && $NF !~ /^\./ {print $NF}' | tr '\n' ' ')
 say "$([ -z "$writable" ] && echo true)" "librqt.a has no variable that changes $writable"
 
 exports=$(nm -D --defined-only "$BUILD/rqt.so" | awk '{print $3}' | tr '\n' ' ')

@@ -1,4 +1,5 @@
-/* test_core_dems.c - real terrain: the core equals the oracle on every 161 x 161 DEM of tests/data, in every block size.
+/* test_core_dems.c - real terrain: the core equals the oracle on every 161 x 161 DEM of tests/data, in every block
+ * size.
  *
  * The files come from GDAL, so heights, voids and units are what users have. RQT_DATA names another folder. */
 #include "test_core_walk.h"
@@ -17,7 +18,8 @@ static raster read_dem(const char *path) {
     int32_t *q = malloc(count * sizeof *q);
     uint8_t *valid = malloc(count);
     if (!z || !q || !valid) abort();
-    assert_int_equal(GDALRasterIO(band, GF_Read, 0, 0, width, height, z, width, height, GDT_Float64, 0, 0), CE_None);
+    assert_int_equal(GDALRasterIO(band, GF_Read, 0, 0, width, height, z, width, height, GDT_Float64, 0, 0),
+                     CE_None);
     int has_nodata;
     const double nodata = GDALGetRasterNoDataValue(band, &has_nodata);
     const bool whole = GDALDataTypeIsInteger(GDALGetRasterDataType(band));
@@ -52,8 +54,12 @@ static int for_each_dem(void (*check)(raster r)) {
     return count;
 }
 
-static void check_errors(raster r) { check_errors_equal_oracle(r); }
-static void check_walks(raster r) { check_queries(r, 3, 1); }
+static void check_errors(raster r) {
+    check_errors_equal_oracle(r);
+}
+static void check_walks(raster r) {
+    check_queries(r, 3, 1);
+}
 
 static void errors_of_real_terrain_equal_the_oracles(void **state) {
     (void)state;

@@ -153,7 +153,6 @@ static void blocks_and_summaries_hold_what_the_oracle_says(void **state) {
     }
 }
 
-
 static void every_place_has_exactly_one_answering_block(void **state) {
     (void)state;
     random_begin("partition");
@@ -191,7 +190,6 @@ static void every_place_has_exactly_one_answering_block(void **state) {
         model_free(&m);
     }
 }
-
 
 static void queries_equal_the_global_walk_on_small_rasters(void **state) {
     (void)state;

@@ -1,5 +1,5 @@
-/* test_core_walk.h - a raster, all of it: every legal block size, eps on and beside stored errors, windows of every kind, each way of
- * selecting, against the oracle's walk over the whole terrain. */
+/* test_core_walk.h - a raster, all of it: every legal block size, eps on and beside stored errors, windows of every
+ * kind, each way of selecting, against the oracle's walk over the whole terrain. */
 #ifndef TEST_CORE_WALK_H
 #define TEST_CORE_WALK_H
 
@@ -110,7 +110,7 @@ static inline void check_patch(const model *m, const rqt_patch *p, const wanted 
 
 /* Every block size and every way of selecting, at one eps, in one window. */
 static inline void check_window(const model *m, database *d, int sizes, const window *w, const oracle_list *leaves,
-                         rqt_code eps, rqt_outline outline) {
+                                rqt_code eps, rqt_outline outline) {
     wanted want = wanted_of(m, leaves, w);
     rqt_region *region = region_of(w, &m->grid.lattice);
     for (int n = 0; n < sizes; n++) {

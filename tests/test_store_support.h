@@ -85,7 +85,7 @@ static inline char *scratch_file(char path[128], const char *name) {
 }
 
 static inline void remove_database(const char *path) {
-    char other[160];
+    char other[512];
     unlink(path);
     snprintf(other, sizeof other, "%s-wal", path);
     unlink(other);

@@ -84,6 +84,7 @@ bool cli_proof_holds(const cli_proof *proof, double eps, double quantum_error);
 /* Texts of a ring of buffers: good for the arguments of one printf. */
 const char *cli_count(int64_t n);                 /* 1 234 567 */
 const char *cli_real(double value);               /* 6 significant digits, no trailing zeros */
+const char *cli_metres(double value);             /* an error: 4 significant digits, plain */
 const char *cli_place(double value, bool lonlat); /* a coordinate, to 0.1 m or better, no trailing zeros */
 const char *cli_length(double metres);            /* 850 m, 12.3 km */
 const char *cli_crs_name(const char *wkt);        /* the name in a WKT, "none" when there is none */

@@ -51,18 +51,16 @@ static bool verify(sqlite3 *db, const char *region, const double *eps, int count
         answered = cli_verify(db, region, eps[i], name, &proof);
         if (!answered) break;
         const bool holds = cli_proof_holds(&proof, eps[i], t->quantum_error);
-        char share[32] = "-", largest[32], rms[32];
+        char share[32] = "-";
         if (proof.samples)
             snprintf(share, sizeof share, "%.2f %%", 100.0 * (double)proof.vertices / (double)proof.samples);
-        snprintf(largest, sizeof largest, "%.4g", proof.max_error);
-        snprintf(rms, sizeof rms, "%.4g", proof.rms_error);
         const char *cells[] = {cli_real(eps[i]),
                                cli_count(proof.samples),
                                cli_count(proof.vertices),
                                cli_count(proof.triangles),
                                share,
-                               largest,
-                               rms,
+                               cli_metres(proof.max_error),
+                               cli_metres(proof.rms_error),
                                proof.has_worst ? cli_place(proof.x, t->lonlat) : "-",
                                proof.has_worst ? cli_place(proof.y, t->lonlat) : "-",
                                cli_count(proof.t_junctions),

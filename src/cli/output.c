@@ -21,12 +21,18 @@ static void remove_and_die(int number) {
     raise(number); /* SA_RESETHAND has put the default back */
 }
 
+/* What is ignored stays ignored: nohup, and shells that run a job in the background, mean it. */
 static void watch_signals(bool on) {
     static const int numbers[] = {SIGINT, SIGTERM, SIGHUP, SIGPIPE};
+    static struct sigaction before[sizeof numbers / sizeof *numbers];
+    const struct sigaction action = {.sa_handler = remove_and_die, .sa_flags = (int)(SA_RESETHAND | SA_NODEFER)};
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
-        struct sigaction action = {.sa_handler = on ? remove_and_die : SIG_DFL,
-                                   .sa_flags = on ? (int)(SA_RESETHAND | SA_NODEFER) : 0};
-        sigaction(numbers[i], &action, NULL);
+        if (!on) {
+            sigaction(numbers[i], &before[i], NULL);
+            continue;
+        }
+        sigaction(numbers[i], NULL, &before[i]);
+        if (before[i].sa_handler != SIG_IGN) sigaction(numbers[i], &action, NULL);
     }
 }
 

@@ -309,12 +309,13 @@ static void draw_caption(const picture_page *page, cairo_t *cr, const picture_me
     snprintf(text, sizeof text, "eps %s m", cli_real(mesh->eps));
     ink(cr, INK);
     write_text(cr, middle, y + 34 * unit, 0.5, room, 24 * unit, true, text);
-    snprintf(text, sizeof text, "%s vertices   ·   %s triangles", cli_count(proof->vertices),
-             cli_count(proof->triangles));
+    snprintf(text, sizeof text, "%s %s   ·   %s %s", cli_count(proof->vertices),
+             proof->vertices == 1 ? "vertex" : "vertices", cli_count(proof->triangles),
+             proof->triangles == 1 ? "triangle" : "triangles");
     write_text(cr, middle, y + 60 * unit, 0.5, room, 16.5 * unit, false, text);
     const double share = proof->samples ? 100.0 * (double)proof->vertices / (double)proof->samples : 0;
-    snprintf(text, sizeof text, "%.3g %% of %s samples   ·   %s %.3g m", share, cli_count(proof->samples),
-             holds ? "true error" : "BROKEN: true error", proof->max_error);
+    snprintf(text, sizeof text, "%.3g %% of %s samples   ·   %s %s m", share, cli_count(proof->samples),
+             holds ? "true error" : "BROKEN: true error", cli_metres(proof->max_error));
     ink(cr, holds ? SOFT : ALARM);
     write_text(cr, middle, y + 83 * unit, 0.5, room, 16.5 * unit, false, text);
 }

@@ -40,6 +40,12 @@ const char *cli_real(double value) {
     return text;
 }
 
+const char *cli_metres(double value) {
+    char *text = next_text();
+    snprintf(text, 64, fabs(value) < 1000 ? "%.4g" : "%.1f", value == 0 ? 0 : value);
+    return fabs(value) < 1000 ? text : trim_zeros(text);
+}
+
 const char *cli_place(double value, bool lonlat) {
     char *text = next_text();
     if (fabs(value) >= 1e15)

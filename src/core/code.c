@@ -1,8 +1,8 @@
 /* code.c - heights in metres, and errors as codes.
  *
  * A code is the upper half of a double, so to say: 9 bits of exponent, 7 of mantissa. Turning a double into the
- * smallest code above it is one addition and one shift. Where the double is only near the true rational, both ends of
- * its uncertainty are rounded; they differ once in some thousand cases, and then integers of 384 bits decide.
+ * smallest code above it is one addition and one shift. Where the double is only near the true rational, both ends
+ * of its uncertainty are rounded; they differ once in some thousand cases, and then integers of 384 bits decide.
  */
 #include "internal.h"
 
@@ -14,8 +14,7 @@
 bool rqt_unit_is_valid(const rqt_unit *unit) {
     return unit->d >= 1 && unit->d <= 1 << 20 && unit->numerator > 0 && unit->numerator <= 1 << 20 &&
            unit->denominator > 0 && unit->denominator <= 1 << 20 && isfinite(unit->scale) && unit->scale != 0 &&
-           isfinite(unit->offset) &&
-           unit->z0 < (INT64_C(1) << 53) && unit->z0 > -(INT64_C(1) << 53);
+           isfinite(unit->offset) && unit->z0 < (INT64_C(1) << 53) && unit->z0 > -(INT64_C(1) << 53);
 }
 
 double rqt_unit_factor(const rqt_unit *unit) {
@@ -48,7 +47,9 @@ static rqt_code code_above_bits(int64_t bits) {
     return code_clamp(((bits + (((int64_t)1 << DROPPED) - 1)) >> DROPPED) - BIAS);
 }
 
-rqt_code code_above(double metres) { return metres > 0 ? code_above_bits(bits_of(metres)) : 0; }
+rqt_code code_above(double metres) {
+    return metres > 0 ? code_above_bits(bits_of(metres)) : 0;
+}
 
 rqt_code rqt_code_floor(double metres) {
     if (!(metres > 0)) return 0;

@@ -1,12 +1,12 @@
 /* error.c - e(P) and the outline bit x(P) of every lattice vertex: exact, over all samples.
  *
- * One walk down the bintree from the two halves of the root, one visit per triangle, children before parents. What a
- * visit computes belongs to the triangle's split vertex, where the two triangles of a diamond meet in a maximum.
+ * One walk down the bintree from the two halves of the root, one visit per triangle, children before parents. What
+ * a visit computes belongs to the triangle's split vertex, where the two triangles of a diamond meet in a maximum.
  *
  * Three ways to a triangle's deviation, all exact:
- *  - Inside the raster and without voids, the plane over a leg or hypotenuse of 2^m is a multiple of 2^-m at samples:
- *    2^m * (z - plane) is an integer, evaluated row by row by a loop that compilers turn into vector code; in 32 bits
- *    where the terrain's relief allows, else in 64.
+ *  - Inside the raster and without voids, the plane over a leg or hypotenuse of 2^m is a multiple of 2^-m at
+ * samples: 2^m * (z - plane) is an integer, evaluated row by row by a loop that compilers turn into vector code; in
+ * 32 bits where the terrain's relief allows, else in 64.
  *  - The triangles of a 2 by 2 cell, half of all, are written out.
  *  - Clamped at the raster's edge, or with voids, a triangle is any triangle: its samples are found by its three
  *    edges and the plane has the denominator of twice its area.
@@ -43,7 +43,9 @@ static bool valid_at(const solver *s, int32_t x, int32_t y) {
     return s->valid[(size_t)cy * (size_t)s->width + (size_t)cx] != 0;
 }
 
-static int state_at(const solver *s, int32_t x, int32_t y) { return valid_at(s, x, y) ? HAS_VALID : HAS_VOID; }
+static int state_at(const solver *s, int32_t x, int32_t y) {
+    return valid_at(s, x, y) ? HAS_VALID : HAS_VOID;
+}
 
 static void raise_error(solver *s, rqt_vertex v, rqt_code code, bool mixed) {
     const int32_t column = lattice_slot(v.x, s->width), row = lattice_slot(v.y, s->height);
@@ -57,7 +59,8 @@ static void raise_error(solver *s, rqt_vertex v, rqt_code code, bool mixed) {
 
 /* ------------------------------------------------------------------------------------- rows of a plane --
  * max over n samples of |(z[i] - base) * 2^m - (start + i * slope)|. */
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && !defined(RQT_SCALAR)
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
+    !defined(RQT_SCALAR)
 #define VECTOR_CLONES __attribute__((target_clones("avx2", "default")))
 #else
 #define VECTOR_CLONES
@@ -85,8 +88,12 @@ VECTOR_CLONES static uint64_t row_deviation_64(const int32_t *z, int32_t n, int6
     return (uint64_t)most;
 }
 
-static int32_t smaller(int32_t a, int32_t b) { return a < b ? a : b; }
-static int32_t larger(int32_t a, int32_t b) { return a > b ? a : b; }
+static int32_t smaller(int32_t a, int32_t b) {
+    return a < b ? a : b;
+}
+static int32_t larger(int32_t a, int32_t b) {
+    return a > b ? a : b;
+}
 
 /* A triangle of the lattice inside the raster, all valid: its deviation as a multiple of 2^-m. */
 static uint64_t plane_deviation(const solver *s, const rqt_triangle *t, int *shift) {
@@ -152,12 +159,14 @@ static uint64_t plane_deviation(const solver *s, const rqt_triangle *t, int *shi
 
 /* ------------------------------------------------------------------------------------ any triangle at all */
 
-static int64_t floor_divide(int64_t a, int64_t b) { return a / b - (a % b != 0 && (a % b < 0) != (b < 0)); }
+static int64_t floor_divide(int64_t a, int64_t b) {
+    return a / b - (a % b != 0 && (a % b < 0) != (b < 0));
+}
 
 typedef struct scan {
-    int state;                  /* HAS_VALID | HAS_VOID over the closed triangle */
+    int state;                   /* HAS_VALID | HAS_VOID over the closed triangle */
     unsigned __int128 deviation; /* largest |denominator * (z - plane)| over its valid samples */
-    uint64_t denominator;       /* twice its area */
+    uint64_t denominator;        /* twice its area */
 } scan;
 
 /* Every sample of the clamped triangle, by its three edges. measure: its corners are valid, so there is a plane. */
@@ -232,7 +241,9 @@ static rqt_code outline_code(const solver *s, rqt_vertex a, rqt_vertex l, rqt_ve
 
 /* ------------------------------------------------------------------------------------------------ the walk */
 
-static rqt_vertex between(rqt_vertex a, rqt_vertex b) { return (rqt_vertex){(a.x + b.x) / 2, (a.y + b.y) / 2}; }
+static rqt_vertex between(rqt_vertex a, rqt_vertex b) {
+    return (rqt_vertex){(a.x + b.x) / 2, (a.y + b.y) / 2};
+}
 
 /* A triangle that is mixed, or clamped, or both. known_state < 0: to be found out. */
 static int visit_irregular(solver *s, const rqt_triangle *t, rqt_vertex split, int known_state) {
@@ -252,8 +263,8 @@ static int visit_irregular(solver *s, const rqt_triangle *t, rqt_vertex split, i
     return found.state;
 }
 
-/* Half of a 2 by 2 cell inside the raster: its own split vertex is the cell's centre, those of its two children are the
- * midpoints of its legs, and its other samples are its corners. */
+/* Half of a 2 by 2 cell inside the raster: its own split vertex is the cell's centre, those of its two children are
+ * the midpoints of its legs, and its other samples are its corners. */
 static int visit_small(solver *s, const rqt_triangle *t) {
     const rqt_vertex m = between(t->left, t->right), p = between(t->apex, t->left), n = between(t->apex, t->right);
     if (s->valid) {
@@ -281,8 +292,8 @@ static int visit_small(solver *s, const rqt_triangle *t) {
     return HAS_VALID;
 }
 
-/* size: log2 of the triangle's area in half cells. Returns what samples the closed triangle holds; 0 where its area is
- * zero. */
+/* size: log2 of the triangle's area in half cells. Returns what samples the closed triangle holds; 0 where its area
+ * is zero. */
 static int visit(solver *s, const rqt_triangle *t, int size) {
     const rqt_vertex a = t->apex, l = t->left, r = t->right;
     if (s->stopped) return 0;
@@ -293,9 +304,9 @@ static int visit(solver *s, const rqt_triangle *t, int size) {
             return 0;
         }
     }
-    if (smaller(smaller(a.x, l.x), r.x) >= s->width - 1 || smaller(smaller(a.y, l.y), r.y) >= s->height - 1) return 0;
-    const bool clamped =
-        larger(larger(a.x, l.x), r.x) >= s->width || larger(larger(a.y, l.y), r.y) >= s->height;
+    if (smaller(smaller(a.x, l.x), r.x) >= s->width - 1 || smaller(smaller(a.y, l.y), r.y) >= s->height - 1)
+        return 0;
+    const bool clamped = larger(larger(a.x, l.x), r.x) >= s->width || larger(larger(a.y, l.y), r.y) >= s->height;
     if (size == 0) /* a half cell: nothing to split, and never clamped, or it would have no area */
         return state_at(s, a.x, a.y) | state_at(s, l.x, l.y) | state_at(s, r.x, r.y);
     if (size == 2 && l.x != r.x && l.y != r.y && !clamped) return visit_small(s, t);
@@ -377,7 +388,8 @@ void rqt_errors_free(rqt_errors *errors, const rqt_allocator *allocator) {
 }
 
 rqt_code rqt_errors_at(const rqt_errors *errors, rqt_vertex v, bool *outline) {
-    const int32_t column = lattice_slot(v.x, errors->lattice.width), row = lattice_slot(v.y, errors->lattice.height);
+    const int32_t column = lattice_slot(v.x, errors->lattice.width),
+                  row = lattice_slot(v.y, errors->lattice.height);
     *outline = false;
     if (column < 0 || row < 0) return 0;
     const size_t at = (size_t)row * (size_t)errors->columns + (size_t)column;

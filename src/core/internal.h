@@ -46,9 +46,15 @@ static inline void put_double(uint8_t *p, double v) {
     memcpy(&bits, &v, 8);
     put64(p, bits);
 }
-static inline uint16_t get16(const uint8_t *p) { return (uint16_t)(p[0] | p[1] << 8); }
-static inline uint32_t get32(const uint8_t *p) { return (uint32_t)get16(p) | (uint32_t)get16(p + 2) << 16; }
-static inline uint64_t get64(const uint8_t *p) { return (uint64_t)get32(p) | (uint64_t)get32(p + 4) << 32; }
+static inline uint16_t get16(const uint8_t *p) {
+    return (uint16_t)(p[0] | p[1] << 8);
+}
+static inline uint32_t get32(const uint8_t *p) {
+    return (uint32_t)get16(p) | (uint32_t)get16(p + 2) << 16;
+}
+static inline uint64_t get64(const uint8_t *p) {
+    return (uint64_t)get32(p) | (uint64_t)get32(p + 4) << 32;
+}
 static inline double get_double(const uint8_t *p) {
     uint64_t bits = get64(p);
     double v;
@@ -67,8 +73,8 @@ void sentence_add_integer(rqt_message *message, int64_t value);
 /* The smallest code not below a double, taken at its word (0 for anything not above 0). code.c */
 rqt_code code_above(double metres);
 
-/* Codes of many errors of one terrain: numerator / 2^shift quanta, exactly as rqt_code_from_quanta, in the common case
- * with one multiplication. shift 0 .. 42. code.c */
+/* Codes of many errors of one terrain: numerator / 2^shift quanta, exactly as rqt_code_from_quanta, in the common
+ * case with one multiplication. shift 0 .. 42. code.c */
 typedef struct code_scale {
     rqt_unit unit;
     double factor; /* metres per quantum, as near as a double comes */
@@ -83,8 +89,8 @@ static inline double bits_double(uint64_t bits) {
     return v;
 }
 
-/* Where column x (0 .. 2^K) of the lattice sits in the arrays of rqt_errors; -1 when it is past the last sample and no
- * error can reach it. lattice.c */
+/* Where column x (0 .. 2^K) of the lattice sits in the arrays of rqt_errors; -1 when it is past the last sample and
+ * no error can reach it. lattice.c */
 int32_t lattice_slot(int32_t x, int32_t samples);
 int32_t lattice_slots(const rqt_lattice *lattice, int32_t samples); /* how many there are */
 

@@ -1,17 +1,21 @@
 /* lattice.c - the lattice of a terrain: vertices, the graph of who depends on whom, and block numbers.
  *
- * Everything follows from coordinates. Let q be the largest power of two that divides both coordinates of a vertex. If
- * both are odd multiples of q the vertex is the *centre* of a cell of side 2q: it splits the cell's diagonal, and depends
- * on the two corners off that diagonal. Otherwise it is a *side* vertex: it splits a side of length 2q, and depends on
- * the centres of the cells on both sides. The diagonal of a cell of side s at (i*s, j*s) runs through the corner
- * whose coordinates are both odd multiples of s: north-west to south-east where i and j have equal parity.
+ * Everything follows from coordinates. Let q be the largest power of two that divides both coordinates of a vertex.
+ * If both are odd multiples of q the vertex is the *centre* of a cell of side 2q: it splits the cell's diagonal,
+ * and depends on the two corners off that diagonal. Otherwise it is a *side* vertex: it splits a side of length 2q,
+ * and depends on the centres of the cells on both sides. The diagonal of a cell of side s at (i*s, j*s) runs
+ * through the corner whose coordinates are both odd multiples of s: north-west to south-east where i and j have
+ * equal parity.
  *
  * Vertices past the last sample are few: errors reach a vertex of column x only from samples nearer than 3q, so for
- * each power of two at most two columns past the raster matter. lattice_slot gives those columns a place behind the samples.
+ * each power of two at most two columns past the raster matter. lattice_slot gives those columns a place behind the
+ * samples.
  */
 #include "internal.h"
 
-static int trailing_zeros(int32_t v) { return __builtin_ctz((unsigned)v); }
+static int trailing_zeros(int32_t v) {
+    return __builtin_ctz((unsigned)v);
+}
 
 rqt_status rqt_lattice_init(rqt_lattice *lattice, int64_t width, int64_t height) {
     const int64_t most = ((int64_t)1 << RQT_MAX_K) + 1;
@@ -91,7 +95,9 @@ rqt_vertex rqt_vertex_clamp(const rqt_lattice *lattice, rqt_vertex v) {
                         v.y < lattice->height ? v.y : lattice->height - 1};
 }
 
-int32_t lattice_slots(const rqt_lattice *lattice, int32_t samples) { return samples + 2 * (lattice->K + 1); }
+int32_t lattice_slots(const rqt_lattice *lattice, int32_t samples) {
+    return samples + 2 * (lattice->K + 1);
+}
 
 int32_t lattice_slot(int32_t x, int32_t samples) {
     if (x < samples) return x;
@@ -128,7 +134,9 @@ rqt_block_number rqt_block_number_of(int level, int32_t i, int32_t j) {
     return (UINT64_C(1) << (2 * level)) | spread((uint32_t)i) | spread((uint32_t)j) << 1;
 }
 
-int rqt_block_levels(const rqt_lattice *lattice, int k) { return lattice->K - k + 1; }
+int rqt_block_levels(const rqt_lattice *lattice, int k) {
+    return lattice->K - k + 1;
+}
 
 rqt_status rqt_block_locate(const rqt_lattice *lattice, int k, rqt_block_number number, rqt_block_place *place) {
     memset(place, 0, sizeof *place);

@@ -2,8 +2,9 @@
  *
  * The interval pyramid: a block of stride t answers eps when no vertex strictly finer than t in its closed cell is
  * selected, but one strictly finer than 2t in its parent's is: em <= eps < em_parent. em grows from child to
- * parent, so of the blocks over one place exactly one answers. A block shares its border rows with its neighbours, and
- * carries two vertices of its parent's border that it lacks (far): what a query reads of a block is all it needs.
+ * parent, so of the blocks over one place exactly one answers. A block shares its border rows with its neighbours,
+ * and carries two vertices of its parent's border that it lacks (far): what a query reads of a block is all it
+ * needs.
  */
 #include "internal.h"
 
@@ -19,7 +20,7 @@ struct rqt_pyramid {
     const rqt_errors *errors;
     int k;
     size_t count;
-    node *nodes;                          /* ascending number: level by level */
+    node *nodes; /* ascending number: level by level */
     size_t level_begin[RQT_MAX_K + 2];
 };
 
@@ -54,7 +55,8 @@ static size_t list_level(const rqt_pyramid *p, int level, int depth, int32_t i, 
     return n;
 }
 
-/* em of a block from its four quarters: what their own grids add between their stride and this one's, and their em. */
+/* em of a block from its four quarters: what their own grids add between their stride and this one's, and their em.
+ */
 static void find_em(const rqt_pyramid *p, node *block) {
     const rqt_lattice *lattice = &p->grid->lattice;
     rqt_block_place place;
@@ -111,7 +113,9 @@ void rqt_pyramid_free(rqt_pyramid *pyramid) {
     memory_drop(&allocator, pyramid);
 }
 
-size_t rqt_pyramid_count(const rqt_pyramid *pyramid) { return pyramid->count; }
+size_t rqt_pyramid_count(const rqt_pyramid *pyramid) {
+    return pyramid->count;
+}
 
 static int32_t sample(const rqt_grid *grid, rqt_vertex v, uint8_t *flags) {
     const rqt_vertex s = rqt_vertex_clamp(&grid->lattice, v);

@@ -1,13 +1,13 @@
 /* query.c - region + eps -> patch: the walk over the blocks that answer.
  *
- * A block that answers holds every selected vertex of its cell, so both halves of its cell are walked without looking at
- * anything else, with one exception. Let p be the block's parent and A the block's corner in the middle of a side of
- * p. If A is not selected, the leaf there is the quarter of p on that side, of which the block has the apex (the centre of
- * p, always selected) and one end; the other end is the block's far vertex. Two siblings share that quarter: the first of
- * those present emits it.
+ * A block that answers holds every selected vertex of its cell, so both halves of its cell are walked without
+ * looking at anything else, with one exception. Let p be the block's parent and A the block's corner in the middle
+ * of a side of p. If A is not selected, the leaf there is the quarter of p on that side, of which the block has the
+ * apex (the centre of p, always selected) and one end; the other end is the block's far vertex. Two siblings share
+ * that quarter: the first of those present emits it.
  *
- * The walk keeps the order of a space-filling curve: each half is entered at one end of its hypotenuse and left at the
- * other, the children in the order that continues it. Neighbours in the list of triangles are neighbours on the
+ * The walk keeps the order of a space-filling curve: each half is entered at one end of its hypotenuse and left at
+ * the other, the children in the order that continues it. Neighbours in the list of triangles are neighbours on the
  * ground, which is what strip.c lives on. The winding is put right as triangles are emitted.
  */
 #include "internal.h"
@@ -101,7 +101,8 @@ static bool is_shared(const walk *w, rqt_vertex v) {
            v.x >= w->query->lattice.width - 1 || v.y >= w->query->lattice.height - 1;
 }
 
-/* The index of a corner in the patch. Vertices inside a block occur in no other block: for them the memo is enough. */
+/* The index of a corner in the patch. Vertices inside a block occur in no other block: for them the memo is enough.
+ */
 static uint32_t intern(walk *w, const corner *c) {
     if (c->memo && *c->memo != NONE) return *c->memo;
     const rqt_vertex sample = rqt_vertex_clamp(&w->query->lattice, c->at);
@@ -136,7 +137,8 @@ static bool keeps(const walk *w, const corner *a, const corner *b, const corner 
     return !(a->at.y >= last_y && b->at.y >= last_y && c->at.y >= last_y);
 }
 
-/* A leaf whose apex, left and right turn clockwise in (col,row): counter-clockwise from above, for rows grow south. */
+/* A leaf whose apex, left and right turn clockwise in (col,row): counter-clockwise from above, for rows grow south.
+ */
 static void put_triangle(walk *w, uint32_t a, uint32_t l, uint32_t r, bool clockwise) {
     uint32_t *out = w->patch->triangles + 3 * w->patch->triangle_count++;
     out[0] = a;
@@ -153,8 +155,8 @@ static void emit(walk *w, const corner *a, const corner *l, const corner *r, boo
                               rqt_vertex_clamp(lattice, r->at)))
             return;
     }
-    const int64_t cross = (int64_t)(l->at.x - a->at.x) * (r->at.y - a->at.y) -
-                          (int64_t)(r->at.x - a->at.x) * (l->at.y - a->at.y);
+    const int64_t cross =
+        (int64_t)(l->at.x - a->at.x) * (r->at.y - a->at.y) - (int64_t)(r->at.x - a->at.x) * (l->at.y - a->at.y);
     const uint32_t i = intern(w, a), j = intern(w, l), k = intern(w, r);
     put_triangle(w, i, j, k, cross < 0);
 }
@@ -193,9 +195,9 @@ static rqt_relation relation_of(const walk *w, rqt_vertex a, rqt_vertex b, rqt_v
     return rqt_region_box_relation(w->query->region, x0, y0, x1, y1);
 }
 
-/* Below a triangle that the region wants as a whole, in a block without voids inside the raster: nothing is left to ask but
- * whether the split vertex is selected. a, l, r: places in the block's arrays; the midpoint of two places is their mean.
- * splits: how often the triangle can be split on the block's grid. */
+/* Below a triangle that the region wants as a whole, in a block without voids inside the raster: nothing is left to
+ * ask but whether the split vertex is selected. a, l, r: places in the block's arrays; the midpoint of two places
+ * is their mean. splits: how often the triangle can be split on the block's grid. */
 static void walk_plain(walk *w, uint32_t a, uint32_t l, uint32_t r, int splits, bool clockwise) {
     const uint32_t m = (l + r) / 2;
     if (splits > 0 && w->chosen[m]) {
@@ -249,7 +251,8 @@ static corner summary_corner(const rqt_summary_vertex *v, int32_t x, int32_t y) 
     return (corner){.at = {x, y}, .q = v->q, .error = v->error, .flags = v->flags, .memo = NULL};
 }
 
-/* One half of the block's cell: apex at corner `a`, hypotenuse from corner `from` to corner `to` (0 NW, 1 NE, 2 SW, 3 SE). */
+/* One half of the block's cell: apex at corner `a`, hypotenuse from corner `from` to corner `to` (0 NW, 1 NE, 2 SW,
+ * 3 SE). */
 static void walk_half(walk *w, const rqt_summary *summary, int a, int from, int to) {
     const rqt_block_place *p = &w->place;
     if (w->block) {
@@ -316,7 +319,8 @@ static void sort_answers(walk *w) {
             for (;;) {
                 size_t child = 2 * root + 1;
                 if (child >= end) break;
-                if (child + 1 < end && morton_order(w, a[child].number) < morton_order(w, a[child + 1].number)) child++;
+                if (child + 1 < end && morton_order(w, a[child].number) < morton_order(w, a[child + 1].number))
+                    child++;
                 if (morton_order(w, a[root].number) >= morton_order(w, a[child].number)) break;
                 const rqt_answer swap = a[root];
                 a[root] = a[child];
@@ -327,8 +331,8 @@ static void sort_answers(walk *w) {
     }
 }
 
-/* The closed set that the answers hold, by the closing algorithms: they look at errors of these blocks only, and reach
- * whatever else a vertex depends on, across blocks, by coordinates. */
+/* The closed set that the answers hold, by the closing algorithms: they look at errors of these blocks only, and
+ * reach whatever else a vertex depends on, across blocks, by coordinates. */
 static rqt_status close_selection(walk *w) {
     rqt_query *query = w->query;
     const rqt_allocator *allocator = w->allocator;

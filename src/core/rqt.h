@@ -34,12 +34,12 @@ extern "C" {
 
 typedef enum rqt_status {
     RQT_OK = 0,
-    RQT_NO_MEMORY,    /* the allocator said no */
-    RQT_CORRUPT,      /* stored bytes are not what their format promises */
-    RQT_INVALID,      /* an argument is outside what the function accepts */
-    RQT_UNSUPPORTED,  /* understood, but not in this version */
-    RQT_READ_FAILED,  /* a callback of the caller failed; the caller knows why */
-    RQT_INTERRUPTED   /* a callback of the caller asked to stop */
+    RQT_NO_MEMORY,   /* the allocator said no */
+    RQT_CORRUPT,     /* stored bytes are not what their format promises */
+    RQT_INVALID,     /* an argument is outside what the function accepts */
+    RQT_UNSUPPORTED, /* understood, but not in this version */
+    RQT_READ_FAILED, /* a callback of the caller failed; the caller knows why */
+    RQT_INTERRUPTED  /* a callback of the caller asked to stop */
 } rqt_status;
 
 /* A sentence about a failure, without trailing newline. Functions that take one fill it when they fail. */
@@ -204,10 +204,10 @@ typedef uint64_t rqt_block_number;
 
 typedef struct rqt_block_place {
     int level;
-    int32_t i, j;      /* cell */
-    int32_t x, y;      /* north-west corner, samples */
-    int32_t side;      /* samples; x+side and y+side may lie past the raster */
-    int32_t stride;    /* samples between neighbours of its grid */
+    int32_t i, j;          /* cell */
+    int32_t x, y;          /* north-west corner, samples */
+    int32_t side;          /* samples; x+side and y+side may lie past the raster */
+    int32_t stride;        /* samples between neighbours of its grid */
     int32_t width, height; /* vertices of its grid up to the first that is at or past the last sample, 1 .. 2^k + 1;
                               the ones after it are the same sample again */
 } rqt_block_place;
@@ -245,8 +245,7 @@ void rqt_codec_free(rqt_codec *codec);
 size_t rqt_block_bound(int k);
 /* block -> bytes (FORMAT.md, "Block"). quantum is the metres of one height quantum, |f|/d, used to predict
  * errors from heights. bytes has room for rqt_block_bound(block->k). Equal blocks give equal bytes. */
-rqt_status rqt_block_encode(rqt_codec *codec, const rqt_block *block, double quantum, uint8_t *bytes,
-                            size_t *size);
+rqt_status rqt_block_encode(rqt_codec *codec, const rqt_block *block, double quantum, uint8_t *bytes, size_t *size);
 /* bytes -> block, which was created with the k that rqt_block_info tells. Trusts nothing: any input gives
  * RQT_OK or RQT_CORRUPT, without reading past size. */
 rqt_status rqt_block_decode(rqt_codec *codec, const uint8_t *bytes, size_t size, rqt_block *block);
@@ -365,7 +364,8 @@ typedef struct rqt_patch_vertex {
 typedef struct rqt_patch {
     rqt_patch_vertex *vertices;
     size_t vertex_count;
-    uint32_t *triangles; /* 3 * triangle_count indices, counter-clockwise seen from above, in the order of the walk */
+    uint32_t
+        *triangles; /* 3 * triangle_count indices, counter-clockwise seen from above, in the order of the walk */
     size_t triangle_count;
     rqt_allocator allocator;
 } rqt_patch;

@@ -1,8 +1,9 @@
-/* saturate.c - e_sat: every vertex takes the maximum over its descendants, so that a threshold alone gives closed sets.
+/* saturate.c - e_sat: every vertex takes the maximum over its descendants, so that a threshold alone gives closed
+ * sets.
  *
- * Fine to coarse, each vertex pulls from its children: the centres of scale q from the four sides of their cell, then the
- * sides of scale 2q from the four centres around them. Saturated codes decide alone: no dependency is looked up at
- * query time ([RQT] equation 3). The outline bit travels the same way, with "or" as its maximum.
+ * Fine to coarse, each vertex pulls from its children: the centres of scale q from the four sides of their cell,
+ * then the sides of scale 2q from the four centres around them. Saturated codes decide alone: no dependency is
+ * looked up at query time ([RQT] equation 3). The outline bit travels the same way, with "or" as its maximum.
  */
 #include "internal.h"
 
@@ -13,14 +14,16 @@ typedef struct field {
 
 static void pull(const field *f, size_t at, int32_t x, int32_t y) {
     if (x < 0 || y < 0 || x > f->side || y > f->side) return;
-    const int32_t column = lattice_slot(x, f->errors->lattice.width), row = lattice_slot(y, f->errors->lattice.height);
+    const int32_t column = lattice_slot(x, f->errors->lattice.width),
+                  row = lattice_slot(y, f->errors->lattice.height);
     if (column < 0 || row < 0) return;
     const size_t from = (size_t)row * (size_t)f->errors->columns + (size_t)column;
     if (f->errors->code[from] > f->errors->code[at]) f->errors->code[at] = f->errors->code[from];
     f->errors->outline[at] |= f->errors->outline[from];
 }
 
-/* All vertices (x,y) = (first_x + i*step, y): pull from four vertices at +-dx, +-dy (crosswise or along the axes). */
+/* All vertices (x,y) = (first_x + i*step, y): pull from four vertices at +-dx, +-dy (crosswise or along the axes).
+ */
 static void pull_row(const field *f, int32_t y, int32_t first_x, int32_t step, int32_t reach, bool diagonal) {
     rqt_errors *e = f->errors;
     const int32_t width = e->lattice.width, height = e->lattice.height;

@@ -1,11 +1,11 @@
 /* selection.c - closed sets of vertices, and the two ways of [RQT] section 4 to close one.
  *
- * The set is a hash table of coordinates, so it knows no block, no border and no corner of a block: parents come from
- * coordinates alone, and what is forced across a border is forced like anything else.
+ * The set is a hash table of coordinates, so it knows no block, no border and no corner of a block: parents come
+ * from coordinates alone, and what is forced across a border is forced like anything else.
  *
- * Algorithm 1 adds a vertex and follows its dependencies until it meets what is there; Algorithm 2 takes the levels from the
- * finest to the coarsest, sides before centres, and marks the parents of what is in the set as it comes. Both end in
- * the same set, the smallest closed one that holds what was asked for.
+ * Algorithm 1 adds a vertex and follows its dependencies until it meets what is there; Algorithm 2 takes the levels
+ * from the finest to the coarsest, sides before centres, and marks the parents of what is in the set as it comes.
+ * Both end in the same set, the smallest closed one that holds what was asked for.
  */
 #include "internal.h"
 
@@ -18,7 +18,9 @@ struct rqt_selection {
 
 #define FIRST_CAPACITY 256
 
-static uint64_t key_of(rqt_vertex v) { return ((uint64_t)(uint32_t)v.y << 32 | (uint32_t)v.x) + 1; }
+static uint64_t key_of(rqt_vertex v) {
+    return ((uint64_t)(uint32_t)v.y << 32 | (uint32_t)v.x) + 1;
+}
 static rqt_vertex vertex_of(uint64_t key) {
     return (rqt_vertex){(int32_t)(uint32_t)(key - 1), (int32_t)((key - 1) >> 32)};
 }
@@ -67,7 +69,9 @@ bool rqt_selection_has(const rqt_selection *s, rqt_vertex v) {
     }
 }
 
-size_t rqt_selection_count(const rqt_selection *selection) { return selection->count; }
+size_t rqt_selection_count(const rqt_selection *selection) {
+    return selection->count;
+}
 
 static void put(uint64_t *slot, size_t capacity, uint64_t key) {
     size_t i = place_of(key, capacity);
@@ -160,7 +164,8 @@ static rqt_status for_selected(const rqt_errors *errors, rqt_code eps, int scale
                                rqt_status (*add)(void *context, rqt_vertex v), void *context) {
     const rqt_lattice *lattice = &errors->lattice;
     const int32_t side = 1 << lattice->K, q = 1 << scale;
-    const int64_t x_end = (int64_t)lattice->width + 3 * (int64_t)q, y_end = (int64_t)lattice->height + 3 * (int64_t)q;
+    const int64_t x_end = (int64_t)lattice->width + 3 * (int64_t)q,
+                  y_end = (int64_t)lattice->height + 3 * (int64_t)q;
     for (int64_t y = 0; y <= side && y < y_end; y += q) {
         const bool odd_row = (y >> scale) & 1;
         for (int64_t x = odd_row ? 0 : q; x <= side && x < x_end; x += odd_row ? q : 2 * q) {
@@ -175,7 +180,9 @@ static rqt_status for_selected(const rqt_errors *errors, rqt_code eps, int scale
     return RQT_OK;
 }
 
-static rqt_status add_resolved(void *context, rqt_vertex v) { return rqt_selection_add_resolved(context, v); }
+static rqt_status add_resolved(void *context, rqt_vertex v) {
+    return rqt_selection_add_resolved(context, v);
+}
 
 rqt_status rqt_select_top_down(const rqt_errors *errors, rqt_code eps, rqt_selection *selection) {
     for (int scale = errors->lattice.K - 1; scale >= 0; scale--) {

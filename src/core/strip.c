@@ -1,10 +1,10 @@
 /* strip.c - one generalized triangle strip through a patch.
  *
- * The patch lists its triangles along a space-filling curve, so a triangle nearly always shares an edge with the one
- * before and the one after. Of a triangle whose first two vertices the strip ends in, the edge that the next one shares
- * says what to append: the third vertex alone, or one vertex again to turn the corner. Where the curve jumps (another
- * block, the region's rim, a void) repeated vertices make triangles without area. The parity is kept throughout:
- * triangle i is counter-clockwise as (i, i+1, i+2) for even i and as (i, i+2, i+1) for odd i.
+ * The patch lists its triangles along a space-filling curve, so a triangle nearly always shares an edge with the
+ * one before and the one after. Of a triangle whose first two vertices the strip ends in, the edge that the next
+ * one shares says what to append: the third vertex alone, or one vertex again to turn the corner. Where the curve
+ * jumps (another block, the region's rim, a void) repeated vertices make triangles without area. The parity is kept
+ * throughout: triangle i is counter-clockwise as (i, i+1, i+2) for even i and as (i, i+2, i+1) for odd i.
  *
  * 1.5 to 1.65 indices a triangle on terrain; never more than 5.
  */

@@ -1,5 +1,5 @@
-/* format.h - a patch as bytes that other programs read: obj, ply, wkb, gpkg, spatialite. (strip and indexed, rqt's own,
- * are the core's.) Knows the core's public header; prints into memory only. */
+/* format.h - a patch as bytes that other programs read: obj, ply, wkb, gpkg, spatialite. (strip and indexed, rqt's
+ * own, are the core's.) Knows the core's public header; prints into memory only. */
 #ifndef RQT_FORMAT_H
 #define RQT_FORMAT_H
 
@@ -26,15 +26,15 @@ typedef struct format_frame {
 /* x,y,z of a vertex: the one expression of the contract, in double, not fused. */
 void format_coordinates(const format_frame *frame, const rqt_patch_vertex *vertex, double xyz[3]);
 
-/* The shortest decimal text that reads back as exactly this double ("1", "-0.25", "1e+300"). text holds 32 bytes. Returns
- * its length. Independent of the locale. */
+/* The shortest decimal text that reads back as exactly this double ("1", "-0.25", "1e+300"). text holds 32 bytes.
+ * Returns its length. Independent of the locale. */
 int format_double(double value, char text[32]);
 
-/* obj: text, "v x y z" with the shortest digits and "f a b c" (1-based). ply: binary little-endian, double x,y,z, int
- * list of three. wkb: ISO MULTIPOLYGON Z (type 1006), every triangle a closed ring of 4 points; gpkg: the same behind a
- * GeoPackage header with an xy envelope (empty flag when empty); spatialite: the same geometry as a SpatiaLite BLOB. An
- * empty patch gives a valid empty file. *bytes is released with allocator->resize(context, bytes, 0).
- * RQT_INVALID when the result would exceed 2^31-1 bytes (what SQLite can return). */
+/* obj: text, "v x y z" with the shortest digits and "f a b c" (1-based). ply: binary little-endian, double x,y,z,
+ * int list of three. wkb: ISO MULTIPOLYGON Z (type 1006), every triangle a closed ring of 4 points; gpkg: the same
+ * behind a GeoPackage header with an xy envelope (empty flag when empty); spatialite: the same geometry as a
+ * SpatiaLite BLOB. An empty patch gives a valid empty file. *bytes is released with allocator->resize(context,
+ * bytes, 0). RQT_INVALID when the result would exceed 2^31-1 bytes (what SQLite can return). */
 rqt_status format_patch(const rqt_patch *patch, const format_frame *frame, format_kind kind,
                         const rqt_allocator *allocator, uint8_t **bytes, size_t *size);
 

@@ -9,20 +9,21 @@ extern "C" {
 #endif
 
 typedef struct import_options {
-    const char *name;    /* NULL: from the first source's file name, up to its first dot, other characters become _ */
-    int k;               /* block size: 2^k + 1 samples a side; 1..8 */
+    const char *name; /* NULL: from the first source's file name, up to its first dot, other characters become _ */
+    int k;            /* block size: 2^k + 1 samples a side; 1..8 */
     bool has_nodata;
-    double nodata;       /* --nodata, beside what the bands declare */
-    const char *unit;    /* NULL: the band's; m, ft, us-ft or a number of metres */
-    double quantum;      /* --quantum: height step in the source's unit for float bands, 0: chosen */
-    double void_tol;     /* c of the outline, > 0 */
-    int jobs;            /* threads that encode blocks */
-    int64_t memory;      /* bytes that the import may take */
+    double nodata;    /* --nodata, beside what the bands declare */
+    const char *unit; /* NULL: the band's; m, ft, us-ft or a number of metres */
+    double quantum;   /* --quantum: height step in the source's unit for float bands, 0: chosen */
+    double void_tol;  /* c of the outline, > 0 */
+    int jobs;         /* threads that encode blocks */
+    int64_t memory;   /* bytes that the import may take */
     bool replace;
-    /* Progress: share 0..1 of one stage ("reading", "errors", "blocks"); samples of the whole. NULL: silent. False stops
-     * the import, which leaves the database as it was. */
+    /* Progress: share 0..1 of one stage ("reading", "errors", "blocks"); samples of the whole. NULL: silent. False
+     * stops the import, which leaves the database as it was. */
     bool (*progress)(void *context, const char *stage, double done, int64_t samples);
-    /* A sentence for the user: what was noticed and done (overlaps that differ, suspicious extremes ...). NULL: none. */
+    /* A sentence for the user: what was noticed and done (overlaps that differ, suspicious extremes ...). NULL:
+     * none. */
     void (*notice)(void *context, const char *sentence);
     void *context;
 } import_options;
@@ -36,9 +37,9 @@ typedef struct import_report {
     double seconds_read, seconds_errors, seconds_blocks;
 } import_report;
 
-/* Import the sources (one grid, one terrain) into the database file, which is created as a GeoPackage when it does not
- * exist or is empty. Returns 0, or 1 with a sentence in message: the database is then as it was (a file that the import
- * created is gone). */
+/* Import the sources (one grid, one terrain) into the database file, which is created as a GeoPackage when it does
+ * not exist or is empty. Returns 0, or 1 with a sentence in message: the database is then as it was (a file that
+ * the import created is gone). */
 int import_run(const char *const *sources, int count, const char *database, const import_options *options,
                import_report *report, char *message, size_t message_size);
 

@@ -1,9 +1,9 @@
 /* reader.c - queries: which blocks answer, and their bytes.
  *
- * What a connection keeps between calls: the rows of rqt_terrain, a pair of prepared statements per terrain, and a cache
- * of decoded blocks. All of it is dropped as soon as any database of the connection has changed: SQLite's data version
- * sees commits of others and our own. While this connection itself writes, nothing is kept from one call to the next,
- * because a rollback would not change the version back.
+ * What a connection keeps between calls: the rows of rqt_terrain, a pair of prepared statements per terrain, and a
+ * cache of decoded blocks. All of it is dropped as soon as any database of the connection has changed: SQLite's
+ * data version sees commits of others and our own. While this connection itself writes, nothing is kept from one
+ * call to the next, because a rollback would not change the version back.
  */
 #include "internal.h"
 
@@ -24,8 +24,8 @@ struct store {
     store_terrain *terrains;
     statements *statements; /* one per terrain */
     int count;
-    bool known;       /* terrains are read, and the cache holds only what is theirs */
-    uint64_t version; /* of all databases, when they were read */
+    bool known;         /* terrains are read, and the cache holds only what is theirs */
+    uint64_t version;   /* of all databases, when they were read */
     sqlite3_stmt *look; /* reads a word of the main database */
     block_cache *cache;
     rqt_codec *codec;
@@ -33,12 +33,18 @@ struct store {
 
 int store_fail_core(char **error, rqt_status status, const char *doing) {
     switch (status) {
-    case RQT_OK: return SQLITE_OK;
-    case RQT_NO_MEMORY: return SQLITE_NOMEM;
-    case RQT_INTERRUPTED: return SQLITE_INTERRUPT;
-    case RQT_CORRUPT: return store_fail(error, SQLITE_CORRUPT, "%s: damaged bytes", doing);
-    case RQT_READ_FAILED: return SQLITE_ERROR; /* the callback has left its sentence */
-    default: return store_fail(error, SQLITE_ERROR, "%s: unusable argument", doing);
+    case RQT_OK:
+        return SQLITE_OK;
+    case RQT_NO_MEMORY:
+        return SQLITE_NOMEM;
+    case RQT_INTERRUPTED:
+        return SQLITE_INTERRUPT;
+    case RQT_CORRUPT:
+        return store_fail(error, SQLITE_CORRUPT, "%s: damaged bytes", doing);
+    case RQT_READ_FAILED:
+        return SQLITE_ERROR; /* the callback has left its sentence */
+    default:
+        return store_fail(error, SQLITE_ERROR, "%s: unusable argument", doing);
     }
 }
 
@@ -57,7 +63,9 @@ int store_open(sqlite3 *db, store **out) {
     return SQLITE_OK;
 }
 
-sqlite3 *store_connection(const store *s) { return s->db; }
+sqlite3 *store_connection(const store *s) {
+    return s->db;
+}
 
 static void finalize(statements *p) {
     sqlite3_finalize(p->answers[0]);
@@ -100,7 +108,8 @@ static void look(store *s, int i, const char *name) {
     }
     char *sql = sqlite3_mprintf("SELECT 1 FROM \"%w\".sqlite_schema LIMIT 1", name);
     sqlite3_stmt *once = NULL;
-    if (sql && sqlite3_prepare_v3(s->db, sql, -1, SQLITE_PREPARE_PERSISTENT, &once, NULL) == SQLITE_OK) (void)sqlite3_step(once);
+    if (sql && sqlite3_prepare_v3(s->db, sql, -1, SQLITE_PREPARE_PERSISTENT, &once, NULL) == SQLITE_OK)
+        (void)sqlite3_step(once);
     sqlite3_free(sql);
     (void)sqlite3_reset(once);
     if (i == 0)
@@ -145,7 +154,8 @@ static int refresh(store *s, char **error) {
         }
         memset(s->statements, 0, bytes);
     }
-    /* The version that a statement of ours has just seen: the file may have changed since it was asked for above. */
+    /* The version that a statement of ours has just seen: the file may have changed since it was asked for above.
+     */
     s->version = version_of(s, &writing);
     s->known = !writing && s->version == version;
     return SQLITE_OK;
@@ -155,7 +165,8 @@ static int refresh(store *s, char **error) {
 static char *names_of(const store *s) {
     sqlite3_str *out = sqlite3_str_new(NULL);
     for (int i = 0; i < s->count; i++)
-        sqlite3_str_appendf(out, "%s%s%s%s", i ? ", " : "", strcmp(s->terrains[i].schema, "main") ? s->terrains[i].schema : "",
+        sqlite3_str_appendf(out, "%s%s%s%s", i ? ", " : "",
+                            strcmp(s->terrains[i].schema, "main") ? s->terrains[i].schema : "",
                             strcmp(s->terrains[i].schema, "main") ? "." : "", s->terrains[i].name);
     return sqlite3_str_finish(out);
 }
@@ -193,13 +204,15 @@ int store_find(store *s, const char *name, const store_terrain **terrain, char *
         *terrain = found;
         return SQLITE_OK;
     }
-    if (s->count == 0) return store_fail(error, SQLITE_ERROR, "this database holds no terrain; rqt import makes one");
+    if (s->count == 0)
+        return store_fail(error, SQLITE_ERROR, "this database holds no terrain; rqt import makes one");
     char *names = names_of(s);
     if (!names) return SQLITE_NOMEM;
     if (!name)
         code = store_fail(error, SQLITE_ERROR, "which terrain? There are %d: %s", s->count, names);
     else if (matches > 1)
-        code = store_fail(error, SQLITE_ERROR, "terrain %s is in %d databases; say which as database.%s", name, matches, name);
+        code = store_fail(error, SQLITE_ERROR, "terrain %s is in %d databases; say which as database.%s", name,
+                          matches, name);
     else
         code = store_fail(error, SQLITE_ERROR, "there is no terrain %s; there is %s", name, names);
     sqlite3_free(names);
@@ -223,19 +236,23 @@ static int prepare(store *s, const store_terrain *t, sqlite3_stmt **out, char *s
     return code;
 }
 
-static statements *statements_of(store *s, const store_terrain *t) { return &s->statements[t - s->terrains]; }
+static statements *statements_of(store *s, const store_terrain *t) {
+    return &s->statements[t - s->terrains];
+}
 
-static int answers_statement(store *s, const store_terrain *t, rqt_outline outline, sqlite3_stmt **out, char **error) {
+static int answers_statement(store *s, const store_terrain *t, rqt_outline outline, sqlite3_stmt **out,
+                             char **error) {
     sqlite3_stmt **kept = &statements_of(s, t)->answers[outline == RQT_OUTLINE_TOL];
     int code = SQLITE_OK;
     if (!*kept) {
         const char *column = outline == RQT_OUTLINE_TOL ? "tol" : "exact";
-        code = prepare(s, t, kept,
-                       sqlite3_mprintf("SELECT b.id, b.summary FROM \"%w\".rqt_index_%lld i "
-                                       "CROSS JOIN \"%w\".rqt_block_%lld b ON b.id = i.id WHERE i.x1 >= ?1 AND i.x0 <= ?2 "
-                                       "AND i.y1 >= ?3 AND i.y0 <= ?4 AND i.%s0 <= ?5 AND i.%s1 >= ?5",
-                                       t->schema, t->id, t->schema, t->id, column, column),
-                       error);
+        code = prepare(
+            s, t, kept,
+            sqlite3_mprintf("SELECT b.id, b.summary FROM \"%w\".rqt_index_%lld i "
+                            "CROSS JOIN \"%w\".rqt_block_%lld b ON b.id = i.id WHERE i.x1 >= ?1 AND i.x0 <= ?2 "
+                            "AND i.y1 >= ?3 AND i.y0 <= ?4 AND i.%s0 <= ?5 AND i.%s1 >= ?5",
+                            t->schema, t->id, t->schema, t->id, column, column),
+            error);
     }
     *out = *kept;
     return code;
@@ -247,9 +264,9 @@ int store_block_bytes(store *s, const store_terrain *t, rqt_block_number number,
     *bytes = NULL;
     *size = 0;
     if (!*kept) {
-        const int code = prepare(s, t, kept,
-                                 sqlite3_mprintf("SELECT data FROM \"%w\".rqt_block_%lld WHERE id = ?1", t->schema, t->id),
-                                 error);
+        const int code = prepare(
+            s, t, kept, sqlite3_mprintf("SELECT data FROM \"%w\".rqt_block_%lld WHERE id = ?1", t->schema, t->id),
+            error);
         if (code != SQLITE_OK) return code;
     }
     sqlite3_reset(*kept);
@@ -284,18 +301,20 @@ static int get_block(store *s, const store_terrain *t, rqt_block_number number, 
     rqt_block_place place;
     rqt_block *fresh = NULL;
     if (rqt_block_info(bytes, (size_t)size, &header, &why) != RQT_OK) {
-        code = store_fail(error, SQLITE_CORRUPT, "terrain %s is damaged: block %llu: %s", t->name, number, why.text);
+        code =
+            store_fail(error, SQLITE_CORRUPT, "terrain %s is damaged: block %llu: %s", t->name, number, why.text);
     } else if (rqt_block_locate(&t->lattice, t->k, number, &place) != RQT_OK || header.k != t->k ||
                header.width != place.width || header.height != place.height) {
-        code = store_fail(error, SQLITE_CORRUPT, "terrain %s is damaged: block %llu does not fit its place", t->name, number);
+        code = store_fail(error, SQLITE_CORRUPT, "terrain %s is damaged: block %llu does not fit its place",
+                          t->name, number);
     } else {
         fresh = block_cache_add(s->cache, key, number, t->k);
         const rqt_status status = fresh ? rqt_block_decode(s->codec, bytes, (size_t)size, fresh) : RQT_NO_MEMORY;
         if (status == RQT_NO_MEMORY)
             code = SQLITE_NOMEM;
         else if (status != RQT_OK)
-            code = store_fail(error, SQLITE_CORRUPT, "terrain %s is damaged: block %llu: its bytes do not decode", t->name,
-                              number);
+            code = store_fail(error, SQLITE_CORRUPT, "terrain %s is damaged: block %llu: its bytes do not decode",
+                              t->name, number);
         if (code != SQLITE_OK && fresh) block_cache_forget(s->cache, key, number);
     }
     sqlite3_reset(statements_of(s, t)->bytes);
@@ -353,8 +372,8 @@ static int find_answers(store *s, const store_terrain *t, const int32_t box[4], 
     sqlite3_reset(row);
     if (code == SQLITE_DONE) {
         if (covered == (int64_t)(box[1] - box[0]) * (box[3] - box[2])) return SQLITE_OK;
-        return store_fail(error, SQLITE_CORRUPT, "terrain %s is damaged: its index does not cover the region; see rqt_check",
-                          t->name);
+        return store_fail(error, SQLITE_CORRUPT,
+                          "terrain %s is damaged: its index does not cover the region; see rqt_check", t->name);
     }
     if (!*error && code != SQLITE_NOMEM) code = store_fail_db(error, s->db, code, "reading the index");
     return code;
@@ -413,7 +432,8 @@ static bool is_interrupted(void *context) {
     return (code & 0xFF) == SQLITE_INTERRUPT;
 }
 
-static int begin_reads(const answer_list *list, const store_query_options *options, rqt_code eps, store_reads *reads) {
+static int begin_reads(const answer_list *list, const store_query_options *options, rqt_code eps,
+                       store_reads *reads) {
     reads->rows = sqlite3_malloc64((list->count ? list->count : 1) * sizeof *reads->rows);
     if (!reads->rows) return SQLITE_NOMEM;
     reads->count = list->count;
@@ -468,7 +488,8 @@ int store_query(store *s, const store_terrain *t, const rqt_region *region, doub
                            .answer_count = list.count,
                            .read_block = read_block,
                            .is_interrupted = is_interrupted};
-        reading r = {.store = s, .terrain = t, .query = &query, .reads = reads, .error = &sentence, .code = SQLITE_OK};
+        reading r = {
+            .store = s, .terrain = t, .query = &query, .reads = reads, .error = &sentence, .code = SQLITE_OK};
         query.context = &r;
         const rqt_status status = rqt_query_run(&query, store_allocator(), patch);
         code = status == RQT_READ_FAILED ? r.code : store_fail_core(&sentence, status, "query");
@@ -484,13 +505,15 @@ int store_query(store *s, const store_terrain *t, const rqt_region *region, doub
     return code;
 }
 
-int store_window(store *s, const store_terrain *t, int32_t col, int32_t row, int32_t width, int32_t height, int32_t *q,
-                 uint8_t *valid, char **error) {
-    if (col < 0 || row < 0 || width < 1 || height < 1 || col > t->lattice.width - width || row > t->lattice.height - height)
+int store_window(store *s, const store_terrain *t, int32_t col, int32_t row, int32_t width, int32_t height,
+                 int32_t *q, uint8_t *valid, char **error) {
+    if (col < 0 || row < 0 || width < 1 || height < 1 || col > t->lattice.width - width ||
+        row > t->lattice.height - height)
         return store_fail(error, SQLITE_ERROR, "a window outside the raster");
     const int shift = t->k, level = t->lattice.K - t->k;
     const int32_t n = (1 << shift) + 1;
-    /* Blocks share borders: take each sample from the block it begins, the last column and row from the last one. */
+    /* Blocks share borders: take each sample from the block it begins, the last column and row from the last one.
+     */
     const int32_t last_i = t->lattice.width > 1 ? (t->lattice.width - 2) >> shift : 0;
     const int32_t last_j = t->lattice.height > 1 ? (t->lattice.height - 2) >> shift : 0;
     for (int32_t j = row >> shift; j <= last_j && j << shift < row + height; j++) {
@@ -523,7 +546,8 @@ static double metres_of(const rqt_unit *unit, double q) {
 }
 
 /* The plane of the half cell that holds the place: what is valid and has weight counts. */
-static int full_height(store *s, const store_terrain *t, double col, double row, double *metres, bool *found, char **error) {
+static int full_height(store *s, const store_terrain *t, double col, double row, double *metres, bool *found,
+                       char **error) {
     const int32_t w = t->lattice.width, h = t->lattice.height;
     int32_t x = (int32_t)col, y = (int32_t)row;
     if (x > w - 2) x = w > 1 ? w - 2 : 0;
@@ -580,7 +604,8 @@ static int mesh_height(store *s, const store_terrain *t, double x, double y, dou
     if (code == SQLITE_OK && patch.triangle_count > 0) {
         const rqt_patch_vertex *a = &patch.vertices[patch.triangles[0]], *b = &patch.vertices[patch.triangles[1]],
                                *c = &patch.vertices[patch.triangles[2]];
-        const double area = (double)(b->col - a->col) * (c->row - a->row) - (double)(c->col - a->col) * (b->row - a->row);
+        const double area =
+            (double)(b->col - a->col) * (c->row - a->row) - (double)(c->col - a->col) * (b->row - a->row);
         const double wb = ((col - a->col) * (c->row - a->row) - (c->col - a->col) * (row - a->row)) / area;
         const double wc = ((b->col - a->col) * (row - a->row) - (col - a->col) * (b->row - a->row)) / area;
         *metres = metres_of(&t->unit, a->q + wb * ((double)b->q - a->q) + wc * ((double)c->q - a->q));

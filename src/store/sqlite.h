@@ -1,5 +1,6 @@
 /* sqlite.h - the one way to SQLite. In rqt.so every call goes through the table that the host hands over
- * (sqlite3ext.h), because a host may carry an SQLite of its own; in the rqt command (SQLITE_CORE) it is a plain call. */
+ * (sqlite3ext.h), because a host may carry an SQLite of its own; in the rqt command (SQLITE_CORE) it is a plain
+ * call. */
 #ifndef RQT_SQLITE_H
 #define RQT_SQLITE_H
 

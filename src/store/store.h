@@ -6,8 +6,8 @@
  * The query side needs two things of an engine only: "the blocks of this terrain that meet this box and answer this
  * eps" (reader.c, answers) and "the bytes of block n" (reader.c, read_block). Nothing else here knows SQL.
  *
- * Results are SQLite's codes. With anything but SQLITE_OK, *error may hold a sentence, to be released with sqlite3_free;
- * without a sentence sqlite3_errstr(code) is the sentence (out of memory, interrupted).
+ * Results are SQLite's codes. With anything but SQLITE_OK, *error may hold a sentence, to be released with
+ * sqlite3_free; without a sentence sqlite3_errstr(code) is the sentence (out of memory, interrupted).
  */
 #ifndef RQT_STORE_H
 #define RQT_STORE_H
@@ -23,8 +23,8 @@ extern "C" {
 const rqt_allocator *store_allocator(void);
 
 typedef struct store_terrain {
-    int64_t id;    /* N of rqt_block_N, rqt_index_N */
-    char name[64]; /* [A-Za-z0-9_.-]{1,63} */
+    int64_t id;      /* N of rqt_block_N, rqt_index_N */
+    char name[64];   /* [A-Za-z0-9_.-]{1,63} */
     char schema[64]; /* of the connection: "main" or an attached database's name */
     bool complete;   /* false: an import did not finish; queries refuse it */
     rqt_lattice lattice;
@@ -33,15 +33,15 @@ typedef struct store_terrain {
     rqt_unit unit;
     double quantum_error; /* metres: half a quantum where float heights were rounded, else 0 */
     rqt_void_cost cost;
-    int32_t srid;     /* 0: none known */
-    bool lonlat;      /* coordinates are degrees of longitude and latitude */
-    bool wgs84;       /* ... on WGS 84, whatever the SRID says: what EPSG:4326 regions meet */
-    char *crs;        /* WKT, "" for none */
-    char *vertical;   /* vertical datum as the source names it, "" for none */
-    char *source;     /* where it came from: file names, one a line */
-    char *created;    /* ISO 8601, UTC */
-    int64_t voids;    /* void samples */
-    int32_t min_q, max_q; /* of the valid samples; both 0 when there are none */
+    int32_t srid;          /* 0: none known */
+    bool lonlat;           /* coordinates are degrees of longitude and latitude */
+    bool wgs84;            /* ... on WGS 84, whatever the SRID says: what EPSG:4326 regions meet */
+    char *crs;             /* WKT, "" for none */
+    char *vertical;        /* vertical datum as the source names it, "" for none */
+    char *source;          /* where it came from: file names, one a line */
+    char *created;         /* ISO 8601, UTC */
+    int64_t voids;         /* void samples */
+    int32_t min_q, max_q;  /* of the valid samples; both 0 when there are none */
     int64_t blocks, bytes; /* of the block table: rows, and bytes of BLOBs and summaries */
     rqt_code max_error;    /* the largest finite error of any vertex */
 } store_terrain;
@@ -55,8 +55,8 @@ void store_release(store *s);
 void store_close(store *s);
 
 /* The terrain of this name ("schema.name" reaches into attached databases); NULL: the only one of all. SQLITE_ERROR
- * with a sentence that lists what there is when it is unknown, ambiguous or incomplete. Valid until the next call of
- * store_find on this store. */
+ * with a sentence that lists what there is when it is unknown, ambiguous or incomplete. Valid until the next call
+ * of store_find on this store. */
 int store_find(store *s, const char *name, const store_terrain **terrain, char **error);
 /* All terrains, incomplete ones too, by schema and name. *count entries; release with store_terrains_free. */
 int store_terrains(store *s, store_terrain **terrains, int *count, char **error);
@@ -85,8 +85,8 @@ void store_reads_free(store_reads *reads);
 int store_query(store *s, const store_terrain *t, const rqt_region *region, double eps,
                 const store_query_options *options, rqt_patch *patch, store_reads *reads, char **error);
 /* Full-resolution samples of a window inside the raster, for width*height values each, row by row. */
-int store_window(store *s, const store_terrain *t, int32_t col, int32_t row, int32_t width, int32_t height, int32_t *q,
-                 uint8_t *valid, char **error);
+int store_window(store *s, const store_terrain *t, int32_t col, int32_t row, int32_t width, int32_t height,
+                 int32_t *q, uint8_t *valid, char **error);
 /* Height in metres at CRS coordinates on the mesh of eps (eps < 0: full resolution). *found = false over void or
  * outside. */
 int store_height(store *s, const store_terrain *t, double x, double y, double eps, double *metres, bool *found,
@@ -99,8 +99,8 @@ typedef struct store_finding {
     const char *message;
 } store_finding;
 /* Everything that can be checked without the source: see check.c. tell returns false to stop. */
-int store_check(store *s, const store_terrain *t, bool (*tell)(void *context, const store_finding *finding), void *context,
-                char **error);
+int store_check(store *s, const store_terrain *t, bool (*tell)(void *context, const store_finding *finding),
+                void *context, char **error);
 
 /* ---------------------------------------------------------------------------------------------- writing */
 typedef enum store_kind { STORE_GEOPACKAGE, STORE_PLAIN } store_kind;

@@ -1,7 +1,7 @@
 /* terrain.c - the rows of rqt_terrain: one file knows its columns.
  *
- * Rows are hostile: a hand-edited or damaged number must not become an index out of bounds, so every field is checked for the
- * range that the code behind it relies on.
+ * Rows are hostile: a hand-edited or damaged number must not become an index out of bounds, so every field is
+ * checked for the range that the code behind it relies on.
  */
 #include "internal.h"
 
@@ -75,7 +75,9 @@ void store_terrains_free(store_terrain *terrains, int count) {
     sqlite3_free(terrains);
 }
 
-static bool in_range(int64_t value, int64_t low, int64_t high) { return value >= low && value <= high; }
+static bool in_range(int64_t value, int64_t low, int64_t high) {
+    return value >= low && value <= high;
+}
 
 static int read_row(sqlite3_stmt *row, const char *schema, store_terrain *t, char **error) {
     memset(t, 0, sizeof *t);
@@ -87,8 +89,8 @@ static int read_row(sqlite3_stmt *row, const char *schema, store_terrain *t, cha
     memcpy(t->schema, schema, strlen(schema) + 1);
     const int64_t format = sqlite3_column_int64(row, 2);
     if (format != RQT_FORMAT_VERSION)
-        return store_fail(error, SQLITE_ERROR, "terrain %s has format %lld; this version reads format %d", name, format,
-                          RQT_FORMAT_VERSION);
+        return store_fail(error, SQLITE_ERROR, "terrain %s has format %lld; this version reads format %d", name,
+                          format, RQT_FORMAT_VERSION);
     t->complete = sqlite3_column_int64(row, 3) == 1;
     const int64_t k = sqlite3_column_int64(row, 6);
     t->placement = (rqt_placement){sqlite3_column_double(row, 7), sqlite3_column_double(row, 8),
@@ -130,7 +132,9 @@ static int read_row(sqlite3_stmt *row, const char *schema, store_terrain *t, cha
         else if (!(t->cost.cell > 0) || !(t->cost.c > 0) || !isfinite(t->cost.cell) || !isfinite(t->cost.c))
             wrong = "cell or void_tol";
     }
-    if (wrong) return store_fail(error, SQLITE_CORRUPT, "terrain %s: its row in rqt_terrain has an impossible %s", name, wrong);
+    if (wrong)
+        return store_fail(error, SQLITE_CORRUPT, "terrain %s: its row in rqt_terrain has an impossible %s", name,
+                          wrong);
     t->srid = (int32_t)srid;
     t->lonlat = sqlite3_column_int64(row, 21) != 0;
     t->wgs84 = sqlite3_column_int64(row, 22) != 0;
@@ -200,10 +204,11 @@ int store_read_terrains(sqlite3 *db, store_terrain **terrains, int *count, char 
 
 int store_insert_terrain(sqlite3 *db, const store_terrain *t, int64_t *id, char **error) {
     sqlite3_stmt *s = NULL;
-    int code = sqlite3_prepare_v2(db,
-                                  "INSERT INTO main.rqt_terrain(" COLUMNS ") VALUES(NULL,?1,?2,0,?3,?4,?5,?6,?7,?8,?9,?10,"
-                                  "?11,?12,?13,?14,?15,?16,?17,?18,?19,?20,?21,?22,?23,?24,?25,?26,?27,?28,0,0,0)",
-                                  -1, &s, NULL);
+    int code =
+        sqlite3_prepare_v2(db,
+                           "INSERT INTO main.rqt_terrain(" COLUMNS ") VALUES(NULL,?1,?2,0,?3,?4,?5,?6,?7,?8,?9,?10,"
+                           "?11,?12,?13,?14,?15,?16,?17,?18,?19,?20,?21,?22,?23,?24,?25,?26,?27,?28,0,0,0)",
+                           -1, &s, NULL);
     if (code != SQLITE_OK) return store_fail_db(error, db, code, "adding a terrain");
     const double reals[] = {t->placement.x0, t->placement.y0, t->placement.dx, t->placement.dy};
     sqlite3_bind_text(s, 1, t->name, -1, SQLITE_STATIC);

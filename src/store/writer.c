@@ -1,7 +1,7 @@
 /* writer.c - one terrain into a database: its row, its tables, its blocks, and its place in a GeoPackage.
  *
- * The caller owns the transaction, so that nothing is ever half there: the row says complete = 0 until the last call,
- * and a crash before the commit leaves the database as it was.
+ * The caller owns the transaction, so that nothing is ever half there: the row says complete = 0 until the last
+ * call, and a crash before the commit leaves the database as it was.
  */
 #include "internal.h"
 
@@ -47,13 +47,15 @@ int store_make_geopackage(sqlite3 *db, char **error) {
     return empty ? run(db, sql_geopackage, error, "making a GeoPackage") : SQLITE_OK;
 }
 
-/* A table of ours in gpkg_contents: GIS hosts then list it as a table without geometry, and leave the others alone. */
+/* A table of ours in gpkg_contents: GIS hosts then list it as a table without geometry, and leave the others alone.
+ */
 static int register_attributes(sqlite3 *db, const char *table, const char *identifier, const char *description,
                                char **error) {
     if (!has_table(db, "gpkg_contents")) return SQLITE_OK;
-    char *sql = sqlite3_mprintf("INSERT OR REPLACE INTO main.gpkg_contents(table_name, data_type, identifier, description) "
-                                "VALUES(%Q, 'attributes', %Q, %Q)",
-                                table, identifier, description);
+    char *sql =
+        sqlite3_mprintf("INSERT OR REPLACE INTO main.gpkg_contents(table_name, data_type, identifier, description) "
+                        "VALUES(%Q, 'attributes', %Q, %Q)",
+                        table, identifier, description);
     if (!sql) return SQLITE_NOMEM;
     const int code = run(db, sql, error, "registering the terrain in the GeoPackage");
     sqlite3_free(sql);
@@ -61,9 +63,10 @@ static int register_attributes(sqlite3 *db, const char *table, const char *ident
 }
 
 static int drop_terrain(sqlite3 *db, int64_t id, char **error) {
-    char *sql = sqlite3_mprintf("DROP TABLE IF EXISTS main.rqt_index_%lld; DROP TABLE IF EXISTS main.rqt_block_%lld; "
-                                "DELETE FROM main.rqt_terrain WHERE id = %lld;",
-                                id, id, id);
+    char *sql =
+        sqlite3_mprintf("DROP TABLE IF EXISTS main.rqt_index_%lld; DROP TABLE IF EXISTS main.rqt_block_%lld; "
+                        "DELETE FROM main.rqt_terrain WHERE id = %lld;",
+                        id, id, id);
     char *contents = has_table(db, "gpkg_contents")
                          ? sqlite3_mprintf("DELETE FROM main.gpkg_contents WHERE table_name = 'rqt_block_%lld'", id)
                          : sqlite3_mprintf("");
@@ -96,7 +99,8 @@ static int prepare(store_writer *w, sqlite3_stmt **out, const char *format, char
 
 static int begin(store_writer *w, const store_terrain *info, bool replace, char **error) {
     if (!store_name_is_valid(info->name))
-        return store_fail(error, SQLITE_ERROR, "%s is no name for a terrain: use 1 to 63 of A-Z a-z 0-9 _ . -", info->name);
+        return store_fail(error, SQLITE_ERROR, "%s is no name for a terrain: use 1 to 63 of A-Z a-z 0-9 _ . -",
+                          info->name);
     int code = run(w->db, sql_schema, error, "creating rqt_terrain");
     if (code == SQLITE_OK)
         code = register_attributes(w->db, "rqt_terrain", "rqt_terrain", "rqt: one row per terrain", error);
@@ -104,7 +108,8 @@ static int begin(store_writer *w, const store_terrain *info, bool replace, char 
     if (code == SQLITE_OK) code = find_id(w->db, info->name, &old, error);
     if (code != SQLITE_OK) return code;
     if (old && !replace)
-        return store_fail(error, SQLITE_ERROR, "terrain %s exists already; use --replace to replace it", info->name);
+        return store_fail(error, SQLITE_ERROR, "terrain %s exists already; use --replace to replace it",
+                          info->name);
     if (old) code = drop_terrain(w->db, old, error);
     if (code == SQLITE_OK) code = store_insert_terrain(w->db, info, &w->id, error);
     if (code != SQLITE_OK) return code;
@@ -120,9 +125,11 @@ static int begin(store_writer *w, const store_terrain *info, bool replace, char 
         sqlite3_free(about);
     }
     if (code == SQLITE_OK)
-        code = prepare(w, &w->put_block, "INSERT INTO main.rqt_block_%lld(id, summary, data) VALUES(?1, ?2, ?3)", error);
+        code = prepare(w, &w->put_block, "INSERT INTO main.rqt_block_%lld(id, summary, data) VALUES(?1, ?2, ?3)",
+                       error);
     if (code == SQLITE_OK)
-        code = prepare(w, &w->put_index, "INSERT INTO main.rqt_index_%lld VALUES(?1,?2,?3,?4,?5,?6,?7,?8,?9)", error);
+        code =
+            prepare(w, &w->put_index, "INSERT INTO main.rqt_index_%lld VALUES(?1,?2,?3,?4,?5,?6,?7,?8,?9)", error);
     return code;
 }
 
@@ -181,9 +188,10 @@ int store_writer_block(store_writer *w, rqt_block_number number, const rqt_summa
 }
 
 int store_writer_finish(store_writer *w, rqt_code max_error, char **error) {
-    char *sql = sqlite3_mprintf("UPDATE main.rqt_terrain SET complete = 1, blocks = %lld, bytes = %lld, max_error = %d "
-                                "WHERE id = %lld",
-                                w->blocks, w->bytes, max_error, w->id);
+    char *sql =
+        sqlite3_mprintf("UPDATE main.rqt_terrain SET complete = 1, blocks = %lld, bytes = %lld, max_error = %d "
+                        "WHERE id = %lld",
+                        w->blocks, w->bytes, max_error, w->id);
     if (!sql) return SQLITE_NOMEM;
     const int code = run(w->db, sql, error, "completing the terrain");
     sqlite3_free(sql);
