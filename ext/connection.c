@@ -54,13 +54,14 @@ int connection_store(connection *c, store **s, char **error) {
         sqlite3_finalize(connects);
         if ((code & 0xFF) == SQLITE_NOMEM) return SQLITE_NOMEM;
     }
-    (void)error;
-    *s = c->store;
-    return SQLITE_OK;
+    const int code = store_begin(c->store, error);
+    if (code == SQLITE_OK) *s = c->store;
+    return code;
 }
 
 void connection_done(connection *c) {
-    if (!c->owned && c->store) store_release(c->store);
+    store_end(c->store);
+    if (!c->owned) store_release(c->store);
 }
 
 int fail(char **error, const char *format, ...) {

@@ -63,6 +63,7 @@ void connection_owner(connection *c, bool owned);
 /* -------------------------------------------------------------------------------- requests for a patch */
 /* region, eps, terrain, options, as every mesh function takes them. request.c */
 typedef struct request {
+    connection *connection; /* held while the request lives */
     store *store;
     const store_terrain *terrain;
     rqt_geometry *geometry;

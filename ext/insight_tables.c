@@ -105,19 +105,29 @@ static void terrains_column(void *data, size_t row, int column, sqlite3_context 
     }
 }
 
+/* All terrains, for as long as the list lives. */
+static int list_terrains(store *s, terrain_list **list, char **error) {
+    *list = sqlite3_malloc(sizeof **list);
+    if (!*list) return SQLITE_NOMEM;
+    **list = (terrain_list){0};
+    const int code = store_terrains(s, &(*list)->rows, &(*list)->count, error);
+    if (code != SQLITE_OK) {
+        sqlite3_free(*list);
+        *list = NULL;
+    }
+    return code;
+}
+
 int fill_terrains(connection *c, sqlite3_value **arguments, row_set *rows, char **error) {
     (void)arguments;
     store *s;
     int code = connection_store(c, &s, error);
-    terrain_list *list = sqlite3_malloc(sizeof *list);
-    if (code == SQLITE_OK && !list) code = SQLITE_NOMEM;
-    if (code == SQLITE_OK) code = store_terrains(s, &list->rows, &list->count, error);
-    if (code != SQLITE_OK) {
-        sqlite3_free(list);
-        return code;
-    }
-    *rows = (row_set){(size_t)list->count, list, terrains_column, release_terrains};
-    return SQLITE_OK;
+    if (code != SQLITE_OK) return code;
+    terrain_list *list;
+    code = list_terrains(s, &list, error);
+    if (code == SQLITE_OK) *rows = (row_set){(size_t)list->count, list, terrains_column, release_terrains};
+    connection_done(c);
+    return code;
 }
 
 /* ------------------------------------------------------------------------------------------ rqt_explain */
@@ -244,48 +254,51 @@ static void check_column(void *data, size_t row, int column, sqlite3_context *re
         sqlite3_result_int64(result, (sqlite3_int64)f->block);
 }
 
-/* Every terrain of the name; all of them without one. Incomplete ones too: that is a finding. */
+/* Does the name, with or without its database, mean this terrain? No name means every one. */
+static bool is_meant(const store_terrain *t, const char *name) {
+    const size_t n = strlen(t->schema);
+    return !name || strcmp(name, t->name) == 0 ||
+           (strncmp(name, t->schema, n) == 0 && name[n] == '.' && strcmp(name + n + 1, t->name) == 0);
+}
+
+static int check_terrains(store *s, const char *name, finding_list *findings, char **error) {
+    terrain_list *terrains;
+    int code = list_terrains(s, &terrains, error);
+    if (code != SQLITE_OK) return code;
+    int checked = 0;
+    for (int i = 0; i < terrains->count && code == SQLITE_OK; i++) {
+        if (!is_meant(&terrains->rows[i], name)) continue;
+        checked++;
+        code = store_check(s, &terrains->rows[i], add_finding, findings, error);
+    }
+    release_terrains(terrains);
+    const store_terrain *none;
+    if (code == SQLITE_OK && name && checked == 0)
+        code = store_find(s, name, &none, error); /* says which there are */
+    return code == SQLITE_OK && findings->out_of_memory ? SQLITE_NOMEM : code;
+}
+
 int fill_check(connection *c, sqlite3_value **arguments, row_set *rows, char **error) {
+    const char *name = NULL;
+    if (arguments[0] && sqlite3_value_type(arguments[0]) != SQLITE_NULL) {
+        name = (const char *)sqlite3_value_text(arguments[0]);
+        if (!name) return SQLITE_NOMEM;
+    }
     store *s;
     int code = connection_store(c, &s, error);
     if (code != SQLITE_OK) return code;
-    terrain_list terrains = {0};
     finding_list *list = sqlite3_malloc(sizeof *list);
-    if (!list) return SQLITE_NOMEM;
-    memset(list, 0, sizeof *list);
-    const char *name = arguments[0] && sqlite3_value_type(arguments[0]) != SQLITE_NULL
-                           ? (const char *)sqlite3_value_text(arguments[0])
-                           : NULL;
-    code = store_terrains(s, &terrains.rows, &terrains.count, error);
-    int checked = 0;
-    for (int i = 0; i < terrains.count && code == SQLITE_OK; i++) {
-        if (name && strcmp(name, terrains.rows[i].name) != 0) continue;
-        checked++;
-        if (!terrains.rows[i].complete) {
-            char *message =
-                sqlite3_mprintf("terrain %s is incomplete: its import did not finish", terrains.rows[i].name);
-            if (!message || !add_finding(list, &(store_finding){"warning", 0, message})) code = SQLITE_NOMEM;
-            sqlite3_free(message);
-            continue;
-        }
-        char *qualified = sqlite3_mprintf("%s.%s", terrains.rows[i].schema, terrains.rows[i].name);
-        const store_terrain *t;
-        code = qualified ? store_find(s, qualified, &t, error) : SQLITE_NOMEM;
-        sqlite3_free(qualified);
-        if (code == SQLITE_OK) code = store_check(s, t, add_finding, list, error);
+    code = list ? SQLITE_OK : SQLITE_NOMEM;
+    if (list) {
+        *list = (finding_list){0};
+        code = check_terrains(s, name, list, error);
     }
-    if (code == SQLITE_OK && list->out_of_memory) code = SQLITE_NOMEM;
-    if (code == SQLITE_OK && name && checked == 0) {
-        const store_terrain *none;
-        code = store_find(s, name, &none, error); /* says which there are */
-    }
-    store_terrains_free(terrains.rows, terrains.count);
-    if (code != SQLITE_OK) {
+    connection_done(c);
+    if (code == SQLITE_OK)
+        *rows = (row_set){list->count, list, check_column, release_findings};
+    else if (list)
         release_findings(list);
-        return code;
-    }
-    *rows = (row_set){list->count, list, check_column, release_findings};
-    return SQLITE_OK;
+    return code;
 }
 
 /* --------------------------------------------------------------------------------------------- rqt_help */

@@ -67,6 +67,7 @@ int request_read(connection *c, sqlite3_value *region, sqlite3_value *eps, sqlit
         code = json ? options_read(json, &r->options, error) : SQLITE_NOMEM;
     }
     if (code == SQLITE_OK) code = connection_store(c, &r->store, error);
+    if (code == SQLITE_OK) r->connection = c;
     if (code == SQLITE_OK) code = request_terrain(r->store, terrain, &r->terrain, error);
     if (code == SQLITE_OK) code = read_region(r, region, error);
     if (code != SQLITE_OK) request_free(r);
@@ -80,6 +81,6 @@ int request_patch(request *r, rqt_patch *patch, store_reads *reads, char **error
 void request_free(request *r) {
     rqt_region_free(r->region);
     rqt_geometry_free(r->geometry);
-    r->region = NULL;
-    r->geometry = NULL;
+    if (r->connection) connection_done(r->connection);
+    *r = (request){0};
 }

@@ -171,7 +171,6 @@ void call_mesh(sqlite3_context *result, int count, sqlite3_value **arguments) {
                      : own_format(&r, &patch, strip ? RQT_MESH_STRIP : RQT_MESH_INDEXED, &bytes, &size, &error);
     rqt_patch_free(&patch);
     request_free(&r);
-    connection_done(c);
     if (code != SQLITE_OK)
         scalar_error(result, "rqt_mesh", code, error);
     else if (kind == FORMAT_OBJ && other)
@@ -194,10 +193,11 @@ void call_height(sqlite3_context *result, int count, sqlite3_value **arguments) 
         code = SQLITE_ERROR;
     else if (count > 2 && eps < 0)
         code = fail(&error, "eps must be 0 or more");
-    if (code == SQLITE_OK) code = connection_store(c, &s, &error);
-    if (code == SQLITE_OK) code = request_terrain(s, count > 3 ? arguments[3] : NULL, &t, &error);
-    if (code == SQLITE_OK) code = store_height(s, t, x, y, eps, &metres, &found, &error);
-    connection_done(c);
+    if (code == SQLITE_OK && (code = connection_store(c, &s, &error)) == SQLITE_OK) {
+        code = request_terrain(s, count > 3 ? arguments[3] : NULL, &t, &error);
+        if (code == SQLITE_OK) code = store_height(s, t, x, y, eps, &metres, &found, &error);
+        connection_done(c);
+    }
     if (code != SQLITE_OK)
         scalar_error(result, "rqt_height", code, error);
     else if (found)

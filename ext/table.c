@@ -183,7 +183,6 @@ static int filter(sqlite3_vtab_cursor *base, int index, const char *text, int ar
     }
     char *sentence = NULL;
     const int code = t->function->fill(t->connection, c->argument, &c->rows, &sentence);
-    connection_done(t->connection);
     if (code != SQLITE_OK && sentence) {
         sqlite3_free(base->pVtab->zErrMsg);
         base->pVtab->zErrMsg = sqlite3_mprintf("%s(): %s", t->function->name, sentence);

@@ -4,6 +4,7 @@ RQT and RQT_SO name the command and the extension (default: build/rqt, build/rqt
 """
 import array
 import atexit
+import json
 import os
 import shutil
 import sqlite3
@@ -201,7 +202,6 @@ def read_raster(source):
     if status != 0:
         raise RuntimeError(said)
     described = run(["gdalinfo", "-json", source])[0]
-    import json
     described = json.loads(described)
     width, height = described["size"]
     nodata = described["bands"][0].get("noDataValue")

@@ -68,7 +68,7 @@ def data(name):
 
 
 sizes = []
-# 3 whole metres of an integer grid; rounded floats; voids; feet with an offset; degrees.
+# Rounded floats; degrees; feet and voids far from the origin.
 path = s.temp("forms.gpkg")
 s.import_terrain(path, data("glarus_alpine_25m_161.tif"), name="alpine")
 db = s.connect(path)
@@ -89,9 +89,10 @@ s.import_terrain(path, s.write_grid(s.temp("feet.asc"), s.rough_grid(37, 29, 21,
 db = s.connect(path)
 for eps in (0, 1, 3.0):
     sizes.append(compare("US feet with voids and no CRS, eps %g" % eps, db, None, eps, 0))
-equal("metres are the one expression of the contract",
-      [r for r in rows(db, "SELECT q, z FROM rqt_range(NULL, 0)") if (0.0 + r[0] / 1.0) * (1.0 * 1200 / 3937) + 0.0 != r[1]
-       and ((one(db, "SELECT z0 FROM rqt_terrain") + 0.0) + r[0] / 1.0) * (1.0 * 1200 / 3937) != r[1]], [])
+z0, d, f, o = rows(db, "SELECT z0, d, scale * unit_numerator / unit_denominator, height_offset FROM rqt_terrain")[0]
+equal("metres are the one expression of the contract", [r for r in rows(db, "SELECT q, z FROM rqt_range(NULL, 0)")
+                                                        if (float(z0) + r[0] / float(d)) * f + o != r[1]], [])
+check("and the unit is the US foot", f == 1200 / 3937, f)
 equal("coordinates are x0 + col*dx and y0 + row*dy, in double",
       [r for r in rows(db, "SELECT col, row, x, y, t.x0, t.y0, t.dx, t.dy FROM rqt_range(NULL, 0), rqt_terrains t")
        if r[4] + r[0] * r[6] != r[2] or r[5] + r[1] * r[7] != r[3]], [])

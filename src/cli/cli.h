@@ -55,7 +55,7 @@ char *cli_region(const char *text);
 /* ------------------------------------------------------------------------------------ databases (database.c) -- */
 /* Read-only, with the SQL functions. NULL after a sentence. */
 sqlite3 *cli_open(const char *path);
-/* A statement with up to three of the arguments that most functions share; NULL after a sentence. */
+/* A statement, to be finalized; NULL after a sentence. */
 sqlite3_stmt *cli_prepare(sqlite3 *db, const char *sql);
 /* Says what SQLite has to say about the connection's last failure, as a sentence; returns CLI_FAILED. */
 int cli_fail_database(sqlite3 *db);

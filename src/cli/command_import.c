@@ -132,8 +132,8 @@ static void print_report(const import_report *r, double seconds) {
         printf("%s void (%.3g %%)\n", cli_count(r->voids), 100.0 * (double)r->voids / samples);
     else
         puts("none void");
-    printf("  %s blocks, %s bytes, %.2f bits per sample\n", cli_count(r->blocks), cli_count(r->bytes),
-           8.0 * (double)r->bytes / samples);
+    printf("  %s block%s, %s bytes, %.2f bits per sample\n", cli_count(r->blocks), r->blocks == 1 ? "" : "s",
+           cli_count(r->bytes), 8.0 * (double)r->bytes / samples);
     printf("  %.2f s (reading %.2f, errors %.2f, blocks %.2f), %.1f Msamples/s\n", seconds, r->seconds_read,
            r->seconds_errors, r->seconds_blocks, samples / (seconds > 1e-9 ? seconds : 1e-9) / 1e6);
     if (r->overlap)

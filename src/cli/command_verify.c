@@ -45,11 +45,11 @@ static bool verify(sqlite3 *db, const char *region, const double *eps, int count
     bool all_hold = true, answered = true;
     cli_table table;
     cli_table_begin(&table, 13, "rrrrrrrrrrrrl");
-    cli_table_add(&table, heads);
     for (int i = 0; i < count; i++) {
         cli_proof proof;
         answered = cli_verify(db, region, eps[i], name, &proof);
         if (!answered) break;
+        if (!i) cli_table_add(&table, heads);
         const bool holds = cli_proof_holds(&proof, eps[i], t->quantum_error);
         char share[32] = "-";
         if (proof.samples)

@@ -51,16 +51,18 @@ int cli_output_begin(cli_output *output, const char *path, const char *forbidden
     if (length < 0 || (size_t)length >= sizeof output->temporary) {
         return cli_fail("the file name is too long");
     }
+    memcpy(signal_file, output->temporary, sizeof signal_file);
+    snprintf(signal_journal, sizeof signal_journal, "%s-journal", output->temporary);
+    watch_signals(true); /* before the first file that it would have to remove */
     /* Where it cannot be written is said before the mesh is made, not after. */
     FILE *probe = fopen(output->temporary, "wxe");
     if (!probe) {
-        return cli_fail("%s cannot be written: %s", path, strerror(errno));
+        cli_fail("%s cannot be written: %s", path, strerror(errno));
+        watch_signals(false);
+        return CLI_FAILED;
     }
     fclose(probe);
     unlink(output->temporary);
-    memcpy(signal_file, output->temporary, sizeof signal_file);
-    snprintf(signal_journal, sizeof signal_journal, "%s-journal", output->temporary);
-    watch_signals(true);
     return CLI_OK;
 }
 

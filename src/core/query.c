@@ -383,9 +383,10 @@ static void choose(walk *w) {
     const rqt_code eps = w->query->eps, *error = w->block->error;
     const uint8_t mask = w->query->outline == RQT_OUTLINE_EXACT ? RQT_OUTLINE : 0, *flags = w->block->flags;
     memset(w->memo, 0xFF, count * sizeof *w->memo);
+    uint8_t *restrict const chosen = w->chosen; /* bytes alias everything else unless they promise not to */
     uint8_t all = RQT_VALID;
     for (size_t i = 0; i < count; i++) {
-        w->chosen[i] = (uint8_t)((error[i] > eps) | ((flags[i] & mask) != 0));
+        chosen[i] = (uint8_t)((error[i] > eps) | ((flags[i] & mask) != 0));
         all &= flags[i];
     }
     w->plain = all && !w->clamped;

@@ -13,6 +13,7 @@
 #include <string.h>
 
 #define CACHE_BYTES ((size_t)64 << 20)
+#define MOST_DATABASES 127 /* of a connection: main, temp, and SQLite's limit of 125 attached ones */
 
 typedef struct statements {
     sqlite3_stmt *answers[2]; /* by rqt_outline */
@@ -24,9 +25,10 @@ struct store {
     store_terrain *terrains;
     statements *statements; /* one per terrain */
     int count;
-    bool known;         /* terrains are read, and the cache holds only what is theirs */
-    uint64_t version;   /* of all databases, when they were read */
-    sqlite3_stmt *look; /* reads a word of the main database */
+    bool known;                         /* terrains are read, and the cache holds only what is theirs */
+    uint64_t version;                   /* of all databases, when they were read */
+    sqlite3_stmt *held[MOST_DATABASES]; /* statements that hold a database as it is */
+    int holders;                        /* calls of store_begin that have not ended */
     block_cache *cache;
     rqt_codec *codec;
 };
@@ -75,8 +77,10 @@ static void finalize(statements *p) {
 }
 
 void store_release(store *s) {
-    sqlite3_finalize(s->look);
-    s->look = NULL;
+    for (int i = 0; i < MOST_DATABASES; i++) {
+        sqlite3_finalize(s->held[i]);
+        s->held[i] = NULL;
+    }
     for (int i = 0; i < s->count; i++) finalize(&s->statements[i]);
 }
 
@@ -99,27 +103,42 @@ void store_close(store *s) {
     sqlite3_free(s);
 }
 
-/* Begin a read of a database for a moment: only then does SQLite look whether others have changed it. */
-static void look(store *s, int i, const char *name) {
-    if (i == 0 && s->look) {
-        (void)sqlite3_step(s->look);
-        (void)sqlite3_reset(s->look);
-        return;
+/* Hold on to one state of every database of the connection, until the matching store_end: what is found, the index,
+ * the bytes and the cache then belong together, whatever others commit. Where a statement of the host already holds
+ * a database there is nothing to do. Beginning to read is also when SQLite looks whether others have changed it. */
+int store_begin(store *s, char **error) {
+    if (s->holders++ > 0) return SQLITE_OK;
+    int code = SQLITE_OK;
+    for (int i = 0; i < MOST_DATABASES && code == SQLITE_OK; i++) {
+        const char *name = sqlite3_db_name(s->db, i);
+        if (!name) break;
+        if (i == 1 || sqlite3_txn_state(s->db, name) != SQLITE_TXN_NONE) continue; /* 1: temp */
+        if (!s->held[i]) {
+            char *sql = sqlite3_mprintf("SELECT 1 FROM \"%w\".sqlite_schema LIMIT 1", name);
+            code = sql ? sqlite3_prepare_v3(s->db, sql, -1, SQLITE_PREPARE_PERSISTENT, &s->held[i], NULL)
+                       : SQLITE_NOMEM;
+            sqlite3_free(sql);
+        }
+        if (code == SQLITE_OK) code = sqlite3_step(s->held[i]);
+        if (code == SQLITE_ROW || code == SQLITE_DONE) code = SQLITE_OK;
     }
-    char *sql = sqlite3_mprintf("SELECT 1 FROM \"%w\".sqlite_schema LIMIT 1", name);
-    sqlite3_stmt *once = NULL;
-    if (sql && sqlite3_prepare_v3(s->db, sql, -1, SQLITE_PREPARE_PERSISTENT, &once, NULL) == SQLITE_OK)
-        (void)sqlite3_step(once);
-    sqlite3_free(sql);
-    (void)sqlite3_reset(once);
-    if (i == 0)
-        s->look = once; /* the main database is asked often */
-    else
-        sqlite3_finalize(once);
+    if (code == SQLITE_OK) return SQLITE_OK;
+    code = store_fail_db(error, s->db, code, "reading the database");
+    store_end(s);
+    return code;
+}
+
+void store_end(store *s) {
+    if (--s->holders > 0) return;
+    sqlite3_reset(s->held[0]); /* the main database is asked often: its statement stays */
+    for (int i = 2; i < MOST_DATABASES; i++) {
+        sqlite3_finalize(s->held[i]);
+        s->held[i] = NULL;
+    }
 }
 
 /* A number that changes when any database of the connection does, or one is attached or detached. */
-static uint64_t version_of(store *s, bool *writing) {
+static uint64_t version_of(const store *s, bool *writing) {
     sqlite3 *db = s->db;
     uint64_t h = 0;
     *writing = false;
@@ -127,7 +146,6 @@ static uint64_t version_of(store *s, bool *writing) {
         const char *name = sqlite3_db_name(db, i);
         if (!name) return h;
         if (i == 1) continue; /* temp */
-        if (sqlite3_txn_state(db, name) == SQLITE_TXN_NONE) look(s, i, name);
         unsigned version = 0;
         (void)sqlite3_file_control(db, name, SQLITE_FCNTL_DATA_VERSION, &version);
         h = (h ^ version) * UINT64_C(0x9E3779B97F4A7C15);
@@ -138,7 +156,7 @@ static uint64_t version_of(store *s, bool *writing) {
 
 static int refresh(store *s, char **error) {
     bool writing;
-    uint64_t version = version_of(s, &writing);
+    const uint64_t version = version_of(s, &writing);
     if (s->known && !writing && version == s->version) return SQLITE_OK;
     forget(s);
     int code = store_read_terrains(s->db, &s->terrains, &s->count, error);
@@ -154,10 +172,8 @@ static int refresh(store *s, char **error) {
         }
         memset(s->statements, 0, bytes);
     }
-    /* The version that a statement of ours has just seen: the file may have changed since it was asked for above.
-     */
-    s->version = version_of(s, &writing);
-    s->known = !writing && s->version == version;
+    s->version = version;
+    s->known = !writing;
     return SQLITE_OK;
 }
 
@@ -178,8 +194,7 @@ static int meant(const store_terrain *t, const char *name) {
     return strncmp(name, t->schema, n) == 0 && name[n] == '.' && strcmp(name + n + 1, t->name) == 0;
 }
 
-int store_find(store *s, const char *name, const store_terrain **terrain, char **error) {
-    *terrain = NULL;
+static int find(store *s, const char *name, const store_terrain **terrain, char **error) {
     int code = refresh(s, error);
     if (code != SQLITE_OK) return code;
     const store_terrain *found = NULL;
@@ -216,6 +231,15 @@ int store_find(store *s, const char *name, const store_terrain **terrain, char *
     else
         code = store_fail(error, SQLITE_ERROR, "there is no terrain %s; there is %s", name, names);
     sqlite3_free(names);
+    return code;
+}
+
+int store_find(store *s, const char *name, const store_terrain **terrain, char **error) {
+    *terrain = NULL;
+    int code = store_begin(s, error);
+    if (code != SQLITE_OK) return code;
+    code = find(s, name, terrain, error);
+    store_end(s);
     return code;
 }
 
@@ -341,6 +365,15 @@ static int find_answers(store *s, const store_terrain *t, const int32_t box[4], 
     for (int i = 0; i < 4; i++) sqlite3_bind_int(row, i + 1, box[i]);
     sqlite3_bind_int(row, 5, eps);
     int64_t covered = 0;
+    int32_t proof[4] = {box[0], box[1], box[2], box[3]};
+    for (int a = 0; a < 4; a += 2) {
+        const int32_t samples = a ? t->lattice.height : t->lattice.width;
+        if (proof[a] != proof[a + 1]) continue;
+        if (proof[a + 1] < samples - 1 || samples == 1)
+            proof[a + 1]++;
+        else
+            proof[a]--;
+    }
     while ((code = sqlite3_step(row)) == SQLITE_ROW) {
         if (list->count == list->capacity) {
             const size_t more = list->capacity ? 2 * list->capacity : 64;
@@ -364,14 +397,14 @@ static int find_answers(store *s, const store_terrain *t, const int32_t box[4], 
                               (sqlite3_int64)answer->number);
             break;
         }
-        const int64_t x0 = p.x > box[0] ? p.x : box[0], x1 = p.x + p.side < box[1] ? p.x + p.side : box[1];
-        const int64_t y0 = p.y > box[2] ? p.y : box[2], y1 = p.y + p.side < box[3] ? p.y + p.side : box[3];
+        const int64_t x0 = p.x > proof[0] ? p.x : proof[0], x1 = p.x + p.side < proof[1] ? p.x + p.side : proof[1];
+        const int64_t y0 = p.y > proof[2] ? p.y : proof[2], y1 = p.y + p.side < proof[3] ? p.y + p.side : proof[3];
         if (x1 > x0 && y1 > y0) covered += (x1 - x0) * (y1 - y0);
         list->count++;
     }
     sqlite3_reset(row);
     if (code == SQLITE_DONE) {
-        if (covered == (int64_t)(box[1] - box[0]) * (box[3] - box[2])) return SQLITE_OK;
+        if (covered == (int64_t)(proof[1] - proof[0]) * (proof[3] - proof[2])) return SQLITE_OK;
         return store_fail(error, SQLITE_CORRUPT,
                           "terrain %s is damaged: its index does not cover the region; see rqt_check", t->name);
     }
@@ -424,12 +457,14 @@ static const rqt_block *read_block(void *context, rqt_block_number number) {
 
 static bool is_interrupted(void *context) {
     /* SQLite 3.40 tells nobody that sqlite3_interrupt was called but a statement that runs: so run one. */
-    const reading *r = context;
+    reading *r = context;
     sqlite3_stmt *probe = NULL;
-    if (sqlite3_prepare_v2(r->store->db, "SELECT 1", -1, &probe, NULL) != SQLITE_OK) return true;
-    const int code = sqlite3_step(probe);
+    int code = sqlite3_prepare_v2(r->store->db, "SELECT 1", -1, &probe, NULL);
+    if (code == SQLITE_OK) code = sqlite3_step(probe);
     sqlite3_finalize(probe);
-    return (code & 0xFF) == SQLITE_INTERRUPT;
+    if (code == SQLITE_ROW) return false;
+    r->code = code & 0xFF;
+    return true;
 }
 
 static int begin_reads(const answer_list *list, const store_query_options *options, rqt_code eps,
@@ -465,8 +500,8 @@ static void order_reads(store_reads *reads, const rqt_query *query) {
     }
 }
 
-int store_query(store *s, const store_terrain *t, const rqt_region *region, double eps,
-                const store_query_options *options, rqt_patch *patch, store_reads *reads, char **error) {
+static int query(store *s, const store_terrain *t, const rqt_region *region, double eps,
+                 const store_query_options *options, rqt_patch *patch, store_reads *reads, char **error) {
     memset(patch, 0, sizeof *patch);
     if (reads) memset(reads, 0, sizeof *reads);
     if (!(eps >= 0)) return store_fail(error, SQLITE_ERROR, "eps must be a number of metres, 0 or more");
@@ -492,7 +527,8 @@ int store_query(store *s, const store_terrain *t, const rqt_region *region, doub
             .store = s, .terrain = t, .query = &query, .reads = reads, .error = &sentence, .code = SQLITE_OK};
         query.context = &r;
         const rqt_status status = rqt_query_run(&query, store_allocator(), patch);
-        code = status == RQT_READ_FAILED ? r.code : store_fail_core(&sentence, status, "query");
+        code = status == RQT_READ_FAILED || status == RQT_INTERRUPTED ? r.code
+                                                                      : store_fail_core(&sentence, status, "query");
         if (code == SQLITE_OK && reads) order_reads(reads, &query);
     }
     sqlite3_free(list.rows);
@@ -505,8 +541,28 @@ int store_query(store *s, const store_terrain *t, const rqt_region *region, doub
     return code;
 }
 
-int store_window(store *s, const store_terrain *t, int32_t col, int32_t row, int32_t width, int32_t height,
-                 int32_t *q, uint8_t *valid, char **error) {
+/* store_begin, and the state is still the one in which store_find found the terrain. */
+static int begin_on(store *s, const store_terrain *t, char **error) {
+    const int code = store_begin(s, error);
+    bool writing;
+    if (code != SQLITE_OK || version_of(s, &writing) == s->version) return code;
+    store_end(s);
+    return store_fail(error, SQLITE_BUSY, "terrain %s has just changed: ask again", t->name);
+}
+
+int store_query(store *s, const store_terrain *t, const rqt_region *region, double eps,
+                const store_query_options *options, rqt_patch *patch, store_reads *reads, char **error) {
+    memset(patch, 0, sizeof *patch);
+    if (reads) memset(reads, 0, sizeof *reads);
+    int code = begin_on(s, t, error);
+    if (code != SQLITE_OK) return code;
+    code = query(s, t, region, eps, options, patch, reads, error);
+    store_end(s);
+    return code;
+}
+
+static int window(store *s, const store_terrain *t, int32_t col, int32_t row, int32_t width, int32_t height,
+                  int32_t *q, uint8_t *valid, char **error) {
     if (col < 0 || row < 0 || width < 1 || height < 1 || col > t->lattice.width - width ||
         row > t->lattice.height - height)
         return store_fail(error, SQLITE_ERROR, "a window outside the raster");
@@ -537,6 +593,15 @@ int store_window(store *s, const store_terrain *t, int32_t col, int32_t row, int
         }
     }
     return SQLITE_OK;
+}
+
+int store_window(store *s, const store_terrain *t, int32_t col, int32_t row, int32_t width, int32_t height,
+                 int32_t *q, uint8_t *valid, char **error) {
+    int code = begin_on(s, t, error);
+    if (code != SQLITE_OK) return code;
+    code = window(s, t, col, row, width, height, q, valid, error);
+    store_end(s);
+    return code;
 }
 
 /* ------------------------------------------------------------------------------------------------- heights */
@@ -626,6 +691,10 @@ int store_height(store *s, const store_terrain *t, double x, double y, double ep
     const double col = nearbyint((x - t->placement.x0) / t->placement.dx * 0x1p20) * 0x1p-20;
     const double row = nearbyint((y - t->placement.y0) / t->placement.dy * 0x1p20) * 0x1p-20;
     if (!(col >= 0 && row >= 0 && col <= t->lattice.width - 1 && row <= t->lattice.height - 1)) return SQLITE_OK;
-    if (eps < 0) return full_height(s, t, col, row, metres, found, error);
-    return mesh_height(s, t, x, y, col, row, eps, metres, found, error);
+    int code = begin_on(s, t, error);
+    if (code != SQLITE_OK) return code;
+    code = eps < 0 ? full_height(s, t, col, row, metres, found, error)
+                   : mesh_height(s, t, x, y, col, row, eps, metres, found, error);
+    store_end(s);
+    return code;
 }

@@ -54,6 +54,11 @@ int store_open(sqlite3 *db, store **out);
 void store_release(store *s);
 void store_close(store *s);
 
+/* Between store_begin and store_end every call sees one state of the databases, whatever other connections commit
+ * (the functions below do it for themselves, each alone). Nests. */
+int store_begin(store *s, char **error);
+void store_end(store *s);
+
 /* The terrain of this name ("schema.name" reaches into attached databases); NULL: the only one of all. SQLITE_ERROR
  * with a sentence that lists what there is when it is unknown, ambiguous or incomplete. Valid until the next call
  * of store_find on this store. */

@@ -1,0 +1,326 @@
+#!/bin/bash
+# test_cli.sh - the rqt command as its users meet it: exit status, help, sentences, what each command prints and writes,
+# and that nothing half done is left behind, whenever it is stopped.
+#
+# $RQT names the command (default build/rqt), $RQT_SO the extension (default: rqt.so beside it). Makes its own rasters.
+set -u
+RQT=$(realpath "${RQT:-build/rqt}")
+RQT_SO=${RQT_SO:-$(dirname "$RQT")/rqt.so}
+T=$(mktemp -d)
+trap 'chmod -R u+w "$T"; rm -rf "$T"' EXIT
+cd "$T" || exit 1
+passed=0 failed=0
+
+ok() { # what condition-status [why]
+    if [ "$2" = 0 ]; then
+        passed=$((passed + 1)); echo "ok      $1"
+    else
+        failed=$((failed + 1)); echo "FAILED  $1"
+        [ -n "${3:-}" ] && echo "$3" | sed 's/^/          /' | head -12
+    fi
+}
+# Runs the command: status in $status, stdout and stderr in out and err.
+rqt() { "$RQT" "$@" >out 2>err </dev/null; status=$?; }
+# What, expected status, part of stderr, arguments...
+refuses() {
+    local what=$1 expected=$2 phrase=$3
+    shift 3
+    rqt "$@"
+    [ $status = "$expected" ] && [ ! -s out ] && grep -qF -- "$phrase" err
+    ok "$what" $? "status $status, not $expected; stderr without '$phrase': $(cat err); stdout: $(head -c 300 out)"
+}
+prints() { # what, part of stdout, arguments...
+    local what=$1 phrase=$2
+    shift 2
+    rqt "$@"
+    [ $status = 0 ] && grep -qF -- "$phrase" out
+    ok "$what" $? "status $status; stdout without '$phrase': $(head -c 600 out); stderr: $(cat err)"
+}
+sql() { sqlite3 -cmd ".load $RQT_SO" "$@"; }
+
+# ------------------------------------------------------------------------------------------------------ rasters
+# 70 x 50 samples of 10 units: a hill with ripples, and a hole of voids when asked for.
+grid() { # file voids
+    awk -v voids="$2" 'BEGIN {
+        print "ncols 70\nnrows 50\nxllcorner 1000\nyllcorner 2000\ncellsize 10\nNODATA_value -9999"
+        for (r = 0; r < 50; r++) for (c = 0; c < 70; c++) {
+            z = 300 + 200 * exp(-((c - 40) ^ 2 + (r - 20) ^ 2) / 200) + 15 * sin(c / 3) * cos(r / 4)
+            if (voids && (c - 20) ^ 2 + (r - 30) ^ 2 < 60) z = -9999
+            printf "%d%s", z, c == 69 ? "\n" : " "
+        } }' >"$1"
+}
+grid hill.asc 0
+grid holes.asc 1
+# Big enough to be caught in the act: 2000 x 2000 samples of noise.
+head -c 8000000 /dev/urandom >big.bil
+printf 'NROWS 2000\nNCOLS 2000\nNBANDS 1\nNBITS 16\nPIXELTYPE SIGNEDINT\nBYTEORDER I\nLAYOUT BIL\n' >big.hdr
+printf 'not a raster\n' >text.txt
+
+# -------------------------------------------------------------------------------------------------- help, usage
+prints "rqt --help" "Commands:" --help
+prints "rqt --version" "rqt 0." --version
+for c in import info check verify mesh; do
+    prints "rqt --help lists $c" "  $c " --help
+    prints "rqt $c --help has examples" "Examples:" $c --help
+    n=$(sed -n '/^Examples:/,$p' out | grep -c "^  rqt $c")
+    [ "$n" -ge 2 ]; ok "rqt $c --help has two examples or more" $? "$n"
+    cp out by_option
+    rqt help $c
+    [ $status = 0 ] && cmp -s out by_option; ok "rqt help $c says the same" $?
+    refuses "rqt $c: unknown option" 2 "there is no option --frobnicate" $c --frobnicate
+    refuses "rqt $c: unknown short option" 2 "there is no option -Z" $c -Z
+done
+refuses "no command" 2 "a command is missing"
+refuses "unknown command" 2 "there is no command dance" dance
+refuses "unknown option before a command" 2 "there is no option --dance" --dance
+for c in update serve chart; do refuses "rqt $c is for later" 2 "not in this version" $c x; done
+
+# ------------------------------------------------------------------------------------------------------- import
+refuses "import: nothing" 2 "a source and a database are missing" import
+refuses "import: no database" 2 "the database is missing" import hill.asc
+refuses "import: --minimal is for later" 2 "--minimal is not in this version" import --minimal hill.asc x.gpkg
+refuses "import: --block 9" 2 "--block 9: K is a whole number from 1 to 8" import --block 9 hill.asc x.gpkg
+refuses "import: --block 5x" 2 "--block 5x" import --block 5x hill.asc x.gpkg
+refuses "import: --block without a value" 2 "the option --block needs a value" import hill.asc x.gpkg --block
+refuses "import: --replace with a value" 2 "the option --replace takes no value" import --replace=1 hill.asc x.gpkg
+refuses "import: a bad name" 2 "a name has 1 to 63 letters" import --name 'a b' hill.asc x.gpkg
+refuses "import: a bad nodata" 2 "--nodata none is not a number" import --nodata none hill.asc x.gpkg
+refuses "import: a bad unit" 2 "--unit furlong: m, ft, us-ft" import --unit furlong hill.asc x.gpkg
+refuses "import: a bad quantum" 2 "--quantum 0 is no height step" import --quantum 0 hill.asc x.gpkg
+refuses "import: a bad void-tol" 2 "--void-tol -1" import --void-tol -1 hill.asc x.gpkg
+refuses "import: bad jobs" 2 "--jobs 0" import --jobs 0 hill.asc x.gpkg
+refuses "import: bad memory" 2 "--memory lots" import --memory lots hill.asc x.gpkg
+refuses "import: a missing source" 1 "No such file" import nothing.tif x.gpkg
+refuses "import: not a raster" 1 "text.txt" import text.txt x.gpkg
+refuses "import: too little memory" 1 "MiB of memory" import --memory 1 big.bil x.gpkg
+refuses "import: no folder" 1 "cannot be created" import hill.asc nowhere/x.gpkg
+[ ! -e x.gpkg ]; ok "refused imports leave no database" $?
+
+prints "import reports on stdout" "hill: 3 500 samples, none void" import hill.asc t.gpkg
+grep -qE 'blocks, .* bytes, .* bits per sample' out && grep -q 'Msamples/s' out; ok "import reports size and rate" $? "$(cat out)"
+[ ! -s err ]; ok "import without a terminal shows no progress" $? "$(cat err)"
+refuses "import: the terrain exists" 1 "--replace" import hill.asc t.gpkg
+prints "import --replace" "hill: 3 500" import --replace hill.asc t.gpkg
+prints "import --name, --block, voids" "void (" import --name my.hole-2 --block 3 holes.asc t.gpkg
+prints "import --unit and --quantum" "feet:" import --name feet --unit ft --quantum 0.5 hill.asc u.gpkg
+prints "import --nodata marks voids" "void (" import --name nd --nodata 300 hill.asc u.gpkg
+printf 'no database at all, but long enough to be looked at: %0100d\n' 0 >bad.gpkg; cp bad.gpkg bad.copy
+refuses "import into what is no database" 1 "not an SQLite database" import hill.asc bad.gpkg
+cmp -s bad.gpkg bad.copy; ok "... leaves it as it was" $?
+if command -v script >/dev/null; then
+    script -qec "$RQT import --replace big.bil tty.gpkg" /dev/null >tty 2>&1 </dev/null
+    grep -q $'\r.*%' tty && grep -q 'Msamples/s' tty; ok "import on a terminal shows progress" $? "$(head -c 300 tty)"
+    rm -f tty.gpkg
+fi
+
+# ----------------------------------------------------------------------------------------------------- info, check
+for c in info check verify mesh; do refuses "$c: no database" 2 "a database is missing" $c; done
+for c in info check; do
+    refuses "$c: two databases" 2 "one database" $c a b
+    refuses "$c: a missing file" 1 "missing.gpkg: No such file" $c missing.gpkg
+    refuses "$c: a folder" 1 "is a folder" $c .
+    refuses "$c: not a database" 1 "is not an SQLite database" $c bad.gpkg
+done
+[ ! -e missing.gpkg ]; ok "asking for a missing database does not make it" $?
+prints "info lists the terrains" "my.hole-2" info t.gpkg
+grep -q '^hill .*70 x 50' out && grep -q 'extent   x 1005 .. 1695, y 2005 .. 2495' out && grep -q 'source   hill.asc' out
+ok "info shows size, extent, source" $? "$(cat out)"
+prints "info --json" '"name"' info --json t.gpkg
+python3 -c 'import json; a = json.load(open("out")); assert [t["name"] for t in a] == ["hill", "my.hole-2"], a
+assert a[0]["width"] == 70 and a[0]["voids"] == 0 and a[1]["voids"] > 0 and a[0]["complete"] is True, a' 2>why
+ok "info --json is JSON with the figures" $? "$(cat why)"
+sqlite3 empty.db 'CREATE TABLE t(x)'
+rqt info empty.db; [ $status = 0 ] && [ ! -s out ] && grep -q 'has no terrain' err; ok "info of a database without terrains" $? "$(cat err)"
+prints "check: sound" "hill: sound" check t.gpkg
+prints "check --terrain" "my.hole-2: sound" check --terrain my.hole-2 t.gpkg
+refuses "check: an unknown terrain" 1 "nobody" check --terrain nobody t.gpkg
+cp t.gpkg broken.gpkg
+id=$(sqlite3 broken.gpkg "SELECT id FROM rqt_terrain WHERE name = 'hill'")
+sqlite3 broken.gpkg "UPDATE rqt_block_$id SET data = substr(data, 1, length(data) - 1)"
+rqt check broken.gpkg
+[ $status = 1 ] && grep -q '^hill: error: block 1: ' out && grep -q '^my.hole-2: sound' out
+ok "check of damaged blocks: status 1, and which" $? "$status $(cat out err)"
+cp t.gpkg unfinished.gpkg; sqlite3 unfinished.gpkg "UPDATE rqt_terrain SET complete = 0 WHERE name = 'hill'"
+prints "info shows an unfinished import" "INCOMPLETE" info unfinished.gpkg
+prints "check of an unfinished import says so" "hill: warning: terrain hill is incomplete" check unfinished.gpkg
+refuses "verify of an unfinished import" 1 "hill" verify unfinished.gpkg --terrain hill --eps 1
+
+# ---------------------------------------------------------------------------------------------------------- verify
+refuses "verify: no eps" 2 "--eps is missing" verify t.gpkg
+for e in x 1x '' 1, ,1 nan inf 1e999 '1 2'; do
+    refuses "verify: --eps '$e'" 2 "is no tolerance" verify t.gpkg --eps "$e"
+done
+refuses "verify: --eps -1" 2 "a tolerance is not negative" verify t.gpkg --eps -1
+refuses "verify: too many eps" 2 "at most" verify t.gpkg --eps 1,2,3,4,5,6,7,8,9,10,11,12,13
+refuses "verify: two terrains and no name" 1 "my.hole-2" verify t.gpkg --eps 1
+refuses "verify: a region of another SRID" 1 "SRID 2056" verify u.gpkg --terrain feet --eps 1 --region 'SRID=2056;POINT(0 0)'
+refuses "verify: an unknown terrain" 1 "nobody" verify t.gpkg --eps 1 --terrain nobody
+refuses "verify: a bad box" 2 "is not x0,y0,x1,y1" verify t.gpkg --terrain hill --eps 1 --region 1,2,3
+refuses "verify: a bad number in a box" 2 "is not x0,y0,x1,y1" verify t.gpkg --terrain hill --eps 1 --region 1,2,3,x
+refuses "verify: an empty region" 2 "--region is empty" verify t.gpkg --terrain hill --eps 1 --region ''
+rqt verify t.gpkg --terrain hill --eps 1 --region 'POLYGON((0 0'
+[ $status = 1 ] && [ -s err ] && ! grep -q 'rqt_verify()' err; ok "verify: an unreadable region" $? "$status $(cat err)"
+prints "verify: a list of eps" "holds" verify t.gpkg --terrain hill --eps 0,1,5,20
+[ "$(grep -c holds out)" = 4 ]; ok "... has a row for each" $? "$(cat out)"
+row=$(awk '$1 == 5 { print NF ? $0 : "" }' out | tr -s ' ')
+v=$(sql t.gpkg "SELECT vertices || ' ' || triangles FROM rqt_verify(NULL, 5, 'hill')")
+[[ $(echo "$row" | tr -d ' ') == *"$(echo "$v" | tr -d ' ')"* ]]; ok "... has SQL's numbers" $? "$row; SQL: $v"
+prints "verify: voids" "holds" verify t.gpkg --terrain my.hole-2 --eps 0,3
+prints "verify: a box, given in any order" "holds" verify t.gpkg --terrain hill --eps 2 --region 1400,2400,1200,2200
+cp out box; rqt verify t.gpkg --terrain hill --eps 2 --region 'POLYGON((1200 2200,1400 2200,1400 2400,1200 2400,1200 2200))'
+cmp -s out box; ok "... is the same as its WKT" $?
+prints "verify: a region outside is empty" "empty" verify t.gpkg --terrain hill --eps 2 --region 0,0,1,1
+prints "verify: rounded heights" "holds" verify u.gpkg --terrain feet --eps 0,1
+
+# ------------------------------------------------------------------------------------------------------------ mesh
+M="mesh t.gpkg --terrain hill"
+refuses "mesh: no eps" 2 "--eps is missing" $M -o a.obj
+refuses "mesh: no output" 2 "-o is missing" $M --eps 1
+refuses "mesh: .glb is for later" 2 ".glb is not in this version" $M --eps 1 -o a.glb
+refuses "mesh: an unknown ending" 2 "the file ends in" $M --eps 1 -o a.xyz
+refuses "mesh: no ending" 2 "the file ends in" $M --eps 1 -o .obj
+refuses "mesh: --mode cut is for later" 2 "--mode cut is not in this version" $M --eps 1 --mode cut -o a.obj
+refuses "mesh: an unknown mode" 2 "there is no such mode" $M --eps 1 --mode x -o a.obj
+refuses "mesh: a list of eps for a model" 2 "--eps takes one number" $M --eps 1,2 -o a.obj
+refuses "mesh: too narrow" 2 "--width 100" $M --eps 1 --width 100 -o a.png
+refuses "mesh: the database itself" 2 "is the database itself" $M --eps 1 -o ./t.gpkg
+ln -s t.gpkg link.gpkg
+refuses "mesh: the database by another name" 2 "is the database itself" $M --eps 1 -o link.gpkg
+mkdir folder.obj
+refuses "mesh: a folder" 2 "is a folder" $M --eps 1 -o folder.obj
+refuses "mesh: a folder that is not there" 1 "cannot be written" $M --eps 1 -o nowhere/a.obj
+for kind in obj ply gpkg svg png; do
+    refuses "mesh: unknown terrain, .$kind" 1 "nobody" mesh t.gpkg --terrain nobody --eps 1 -o "a.$kind"
+    refuses "mesh: unreadable region, .$kind" 1 "rqt mesh: " $M --eps 1 --region 'CIRCLE(1)' -o "a.$kind"
+done
+refuses "mesh: damaged blocks" 1 "rqt mesh: " mesh broken.gpkg --terrain hill --eps 0 -o a.obj
+refuses "mesh: a picture of nothing" 1 "nothing to draw" $M --eps 1 --region 0,0,1,1 -o a.png
+left=$(ls -A | grep '^a\.\|\.part-'); [ -z "$left" ]; ok "refused meshes leave no file" $? "$left"
+
+for region in '' 1200,2200,1400,2400; do
+    where=NULL; [ -n "$region" ] && where='rqt_bbox(1200,2200,1400,2400)'
+    want=$(sql t.gpkg "SELECT (SELECT count(*) FROM rqt_range($where, 2, 'hill')) || ' ' ||
+                              (SELECT count(*) FROM rqt_triangles($where, 2, 'hill'))")
+    what=${region:-everything}
+    rqt $M --eps 2 ${region:+--region $region} -o m.obj
+    got="$(grep -c '^v ' m.obj) $(grep -c '^f ' m.obj)"
+    [ $status = 0 ] && [ ! -s out ] && [ ! -s err ] && [ "$got" = "$want" ]
+    ok "obj of $what has SQL's vertices and faces" $? "$got, not $want; $(cat err)"
+    rqt $M --eps 2 ${region:+--region $region} -o m.ply
+    got="$(sed -n 's/^element vertex //p' <(head -c 600 m.ply | tr -d '\0')) $(sed -n 's/^element face //p' <(head -c 600 m.ply | tr -d '\0'))"
+    [ $status = 0 ] && [ "$got" = "$want" ]; ok "ply of $what has SQL's vertices and faces" $? "$got, not $want; $(cat err)"
+    rqt $M --eps 2 ${region:+--region $region} -o m.gpkg
+    got=$(sqlite3 m.gpkg 'SELECT count(*) FROM hill')
+    [ $status = 0 ] && [ "$got" = "${want#* }" ]; ok "gpkg of $what has a row for each triangle" $? "$got, not $want; $(cat err)"
+    if command -v ogrinfo >/dev/null; then
+        ogrinfo -so -al m.gpkg >ogr 2>&1
+        grep -q 'Geometry: 3D Polygon' ogr && grep -q "Feature Count: ${want#* }" ogr && ! grep -qi 'warning\|error' ogr
+        ok "ogrinfo reads it: 3D Polygon, count" $? "$(cat ogr)"
+    fi
+    rm -f m.*
+done
+rqt $M --eps 2 --region 0,0,1,1 -o none.obj; [ $status = 0 ] && ! grep -q '^[vf] ' none.obj; ok "obj of nothing is an empty obj" $? "$(cat err)"
+rqt $M --eps 2 --region 0,0,1,1 -o none.gpkg; [ $status = 0 ] && [ "$(sqlite3 none.gpkg 'SELECT count(*) FROM hill')" = 0 ]
+ok "gpkg of nothing is an empty layer" $? "$(cat err)"
+rqt $M --eps 2 --mode cover -o x.obj; cp x.obj first.obj; echo old >x.obj
+rqt $M --eps 2 -o x.obj; cmp -s x.obj first.obj; ok "mesh replaces a file, and gives the same bytes again" $?
+rqt $M --eps 2 -o X.OBJ; [ $status = 0 ] && cmp -s X.OBJ first.obj; ok "mesh: endings in capitals" $?
+if command -v gdal_translate >/dev/null; then
+    gdal_translate -q -a_srs EPSG:32633 hill.asc utm.tif 2>/dev/null
+    rqt import utm.tif utm.gpkg
+    rqt mesh utm.gpkg --eps 2 -o crs.gpkg; ogrinfo -so -al crs.gpkg >ogr 2>&1
+    grep -q 'UTM zone 33N' ogr; ok "gpkg carries the terrain's CRS" $? "$(cat ogr)"
+fi
+
+size_of() { od -An -tu1 -j16 -N8 "$1" | awk '{ print (($1 * 256 + $2) * 256 + $3) * 256 + $4, (($5 * 256 + $6) * 256 + $7) * 256 + $8 }'; }
+rqt $M --eps 1,5,20 -o three.png
+read -r w h <<<"$(size_of three.png)"
+[ $status = 0 ] && [ ! -s out ] && [ ! -s err ] && [ "$(head -c 4 three.png | tail -c 3)" = PNG ] && [ "$w" = 1800 ] && [ "$h" -gt 400 ]
+ok "png: 1800 wide" $? "$w x $h; $(cat err)"
+rqt $M --eps 5 --width 1200 --region 1200,2200,1400,2400 -o one.png; read -r w h <<<"$(size_of one.png)"
+[ $status = 0 ] && [ "$w" = 1200 ]; ok "png: --width 1200, a region" $? "$w x $h; $(cat err)"
+rqt $M --eps 1,5,20 -o three.svg
+[ $status = 0 ] && python3 - >why 2>&1 <<'PY'
+import xml.dom.minidom as x
+d = x.parse("three.svg").documentElement
+assert d.tagName == "svg" and d.getAttribute("width").startswith("1800"), d.getAttribute("width")
+assert d.getElementsByTagName("image") and d.getElementsByTagName("path")
+PY
+ok "svg: XML, 1800 wide, relief and lines" $? "$(cat why err)"
+for region in 'POINT(1300 2300)' 'LINESTRING(1100 2100,1500 2400)' \
+    'MULTIPOLYGON(((1100 2100,1200 2100,1200 2200,1100 2100)),((1400 2300,1500 2300,1500 2400,1400 2300)))'; do
+    rqt $M --eps 2 --region "$region" -o r.png; read -r w h <<<"$(size_of r.png)"
+    [ $status = 0 ] && [ "$w" = 1800 ]; ok "png of ${region%%(*}" $? "$w x $h; $(cat err)"
+done
+rqt mesh t.gpkg --terrain my.hole-2 --eps 2,9 -o v.png; [ $status = 0 ]; ok "png with voids" $? "$(cat err)"
+if [ -w /dev/full ]; then
+    "$RQT" info t.gpkg >/dev/full 2>err; [ $? = 1 ] && grep -q 'stdout' err; ok "a full disk under stdout is a failure" $? "$(cat err)"
+fi
+[ -z "$(ls -A | grep '\.part-')" ]; ok "no temporary file is left" $?
+
+# ------------------------------------------------------------------------------------------------- read-only, locked
+if [ "$(id -u)" != 0 ]; then
+    chmod a-w u.gpkg; refuses "import: a read-only database" 1 "read-only" import hill.asc u.gpkg; chmod u+w u.gpkg
+fi
+python3 - t.gpkg <<'PY' &
+import sqlite3, sys, time
+db = sqlite3.connect(sys.argv[1], isolation_level=None)
+db.execute("BEGIN IMMEDIATE"); open("locked", "w").close(); time.sleep(8)
+PY
+locker=$!
+until [ -e locked ]; do sleep 0.05; done
+refuses "import: a locked database" 1 "locked" import --replace hill.asc t.gpkg
+prints "info while another program writes" "hill" info t.gpkg
+kill $locker; wait $locker 2>/dev/null
+
+# --------------------------------------------------------------------------------------------- stopped and killed
+# After a stop the database has the terrains it had before, sound, and none that looks whole and is not.
+is_as_before() { # file, terrains expected
+    local names
+    if [ ! -e "$1" ]; then [ "$2" = "" ]; return; fi
+    names=$(sqlite3 "$1" "SELECT group_concat(name) FROM (SELECT name FROM rqt_terrain WHERE complete ORDER BY name)" 2>/dev/null)
+    [ "$names" = "$2" ] && "$RQT" check "$1" >check.out 2>&1
+}
+start=$(date +%s%N); rqt import big.bil whole.gpkg; took=$((($(date +%s%N) - start) / 1000000))
+rm -f whole.gpkg
+# After `wait` some time of the import has passed: parts of the whole in per cent, and the first block's writing.
+stop_at() { # signal, moment, database
+    "$RQT" import --name big big.bil "$3" >stop.out 2>stop.err </dev/null &
+    local pid=$!
+    if [ "$2" = writing ]; then
+        until [ -e "$3-journal" ] || [ -e "$3-wal" ] || ! kill -0 $pid 2>/dev/null; do sleep 0.005; done
+    else
+        sleep "$(awk -v t="$took" -v p="$2" 'BEGIN { print t * p / 100000 }')"
+    fi
+    kill "-$1" $pid 2>/dev/null
+    wait $pid 2>/dev/null
+    status=$?
+}
+for moment in 10 40 70 writing; do
+    for signal in INT KILL; do
+        for kind in new old; do
+            rm -f k.gpkg*; before=
+            if [ $kind = old ]; then "$RQT" import hill.asc k.gpkg >/dev/null; before=hill; fi
+            stop_at $signal $moment k.gpkg
+            if [ $status = 0 ]; then before=${before:+big,}${before:-big}; fi # it was faster than the signal
+            case $signal in
+            INT) { [ $status = 0 ] || { [ $status = 1 ] && grep -q 'stopped while' stop.err && [ ! -s stop.out ]; }; } &&
+                { [ $status = 0 ] || [ $kind = old ] || [ ! -e k.gpkg ]; } ;;
+            KILL) [ $status = 0 ] || [ $status = 137 ] ;;
+            esac
+            ok "SIG$signal at $moment, $kind database: status and sentence" $? "$status $(cat stop.err)"
+            rqt info k.gpkg
+            ! grep -q '^big' out || [[ $before == *big* ]]; ok "... info shows no half terrain" $? "$(cat out)"
+            is_as_before k.gpkg "$before"; ok "... what was there is there, and sound" $? "expected '$before'; $(ls -l k.gpkg* 2>&1; cat check.out 2>/dev/null)"
+        done
+    done
+done
+rqt import --name big --replace big.bil k.gpkg; [ $status = 0 ]; ok "importing again works after all that" $? "$(cat err)"
+rqt check k.gpkg; [ $status = 0 ] && grep -q '^big: sound' out; ok "... and is sound" $? "$(cat out err)"
+"$RQT" mesh k.gpkg --terrain big --eps 0 -o stopped.gpkg 2>/dev/null & pid=$!
+until ls stopped.gpkg.part-* >/dev/null 2>&1 || ! kill -0 $pid 2>/dev/null; do sleep 0.01; done
+kill -TERM $pid 2>/dev/null; wait $pid 2>/dev/null
+left=$(ls -A | grep '^stopped'); [ -z "$left" ]; ok "mesh stopped half-way leaves no file" $? "$left"
+
+echo "$passed passed, $failed failed"
+[ "$failed" = 0 ]
