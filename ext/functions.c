@@ -100,7 +100,8 @@ const function rqt_functions[] = {
     {.name = "rqt_height",
      .arguments = "x, y [, eps [, terrain]]",
      .returns = "REAL",
-     .purpose = "The height in metres at a place of the terrain's CRS, on the full-resolution mesh or the one of "
+     .purpose = "The height in metres at a place of the terrain's CRS (rounded to 2^-20 sample, as regions are), "
+                "on the full-resolution mesh or the one of "
                 "eps; NULL over "
                 "void or outside.",
      .example = "SELECT rqt_height(-71.3033, 44.2705)",

@@ -96,6 +96,16 @@ MUTANTS = [
      "test_verify", "the_error_is_the_double_nearest_to_the_exact_value"),
     ("verifier: looks at one size of triangle only", "src/verify/verify_overlap.c", "level < LEVELS", "level <= our_level",
      "test_verify", "triangles_of_very_different_size_are_compared"),
+    # the store
+    ("store: what a rollback undid stays cached", "src/store/reader.c", "s->known = !writing;", "s->known = true;",
+     "test_store_faults", "a_transaction_of_our_own_is_seen_and_its_rollback_too"),
+    ("store: a commit in the middle of a query", "src/store/reader.c",
+     "if (code != SQLITE_OK || version_of(s, &writing) == s->version) return code;", "if (code == SQLITE_OK) return code;",
+     "test_store_faults", "a_commit_in_the_middle_of_a_query_is_not_mixed_in"),
+    ("store: an interval too long by one", "src/store/writer.c", "interval.em_parent - 1", "interval.em_parent",
+     "test_store", "sound_terrains_have_no_findings"),
+    ("check: errors of parent and child differ", "src/store/check.c", "if (f->block.error[above] < error || outline)",
+     "if (outline)", "test_store", "every_damage_is_found_where_it_is"),
     # import
     ("import: south-up rasters upside down", "src/import/mosaic.c", "if (!(off <= SLACK))", "if (false)",
      "test_import", "sources_of_unlike_grids_are_refused"),

@@ -9,6 +9,8 @@ RQT_SO=${RQT_SO:-$(dirname "$RQT")/rqt.so}
 T=$(mktemp -d)
 trap 'chmod -R u+w "$T"; rm -rf "$T"' EXIT
 cd "$T" || exit 1
+mkdir bin && cp "$RQT" bin/rqt && cp "$RQT_SO" bin/rqt.so || exit 1 # a build beside us must not change them half-way
+RQT=$T/bin/rqt RQT_SO=$T/bin/rqt.so
 passed=0 failed=0
 
 ok() { # what condition-status [why]
