@@ -100,9 +100,10 @@ const function rqt_functions[] = {
     {.name = "rqt_height",
      .arguments = "x, y [, eps [, terrain]]",
      .returns = "REAL",
-     .purpose = "The height in metres at a place of the terrain's CRS (rounded to 2^-20 sample, as regions are), "
-                "on the full-resolution mesh or the one of "
-                "eps; NULL over "
+     .purpose = "The height in metres at a place of the terrain's CRS (rounded to 2^-20 sample, as regions are): "
+                "without eps "
+                "of the full-resolution samples, also where a lone sample bears no triangle; with eps on that "
+                "mesh. NULL over "
                 "void or outside.",
      .example = "SELECT rqt_height(-71.3033, 44.2705)",
      .call = call_height,

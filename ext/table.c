@@ -117,6 +117,16 @@ static int best_index(sqlite3_vtab *base, sqlite3_index_info *info) {
     bool unusable = false;
     for (int i = 0; i < info->nConstraint; i++) {
         const int a = info->aConstraint[i].iColumn - t->columns;
+        if (a >= t->arguments && info->aConstraint[i].op == SQLITE_INDEX_CONSTRAINT_EQ) {
+            /* SQLite hands an argument too many to the next hidden column: without this it would filter rows away.
+             */
+            sqlite3_free(base->zErrMsg);
+            base->zErrMsg =
+                sqlite3_mprintf("%s(): too many arguments; use %s(%s). To compare a further hidden column, "
+                                "write a + before it",
+                                t->function->name, t->function->name, t->function->arguments);
+            return SQLITE_ERROR;
+        }
         if (a < 0 || a >= t->arguments || info->aConstraint[i].op != SQLITE_INDEX_CONSTRAINT_EQ) continue;
         present |= 1 << a;
         if (!info->aConstraint[i].usable)

@@ -20,7 +20,7 @@ count() { # log status name
     passed=$((passed + p)) failed=$((failed + f))
     if [ "$f" != 0 ]; then
         echo "FAILED $3: $f failed"
-        tail -n 60 "$1"
+        grep -E -A4 "FAILED|ERROR|Error|Traceback" "$1" | head -n 40; tail -n 15 "$1"
     else
         printf '  %-44s %4d passed  %3d s\n' "$3" "$p" "$4"
     fi

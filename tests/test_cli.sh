@@ -144,7 +144,9 @@ rqt check broken.gpkg
 ok "check of damaged blocks: status 1, and which" $? "$status $(cat out err)"
 cp t.gpkg unfinished.gpkg; sqlite3 unfinished.gpkg "UPDATE rqt_terrain SET complete = 0 WHERE name = 'hill'"
 prints "info shows an unfinished import" "INCOMPLETE" info unfinished.gpkg
-prints "check of an unfinished import says so" "hill: warning: terrain hill is incomplete" check unfinished.gpkg
+rqt check unfinished.gpkg
+[ $status = 1 ] && grep -q '^hill: error: terrain hill is incomplete' out
+ok "check of an unfinished import: status 1, and it says so" $? "status $status $(cat out err)"
 refuses "verify of an unfinished import" 1 "hill" verify unfinished.gpkg --terrain hill --eps 1
 
 # ---------------------------------------------------------------------------------------------------------- verify

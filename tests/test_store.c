@@ -239,7 +239,7 @@ static void every_damage_is_found_where_it_is(void **state) {
     }
 }
 
-static void incomplete_is_a_warning_and_all_else_an_error(void **state) {
+static void incomplete_is_the_only_finding_of_an_incomplete_terrain(void **state) {
     (void)state;
     sqlite3 *db = memory_terrain(40, 33, K, false);
     findings f;
@@ -250,7 +250,8 @@ static void incomplete_is_a_warning_and_all_else_an_error(void **state) {
     run(db, "UPDATE rqt_terrain SET complete = 0");
     assert_int_equal(check_terrain(db, &f), SQLITE_OK);
     assert_int_equal(f.count, 1);
-    assert_string_equal(f.list[0].severity, "warning");
+    assert_string_equal(f.list[0].severity, "error");
+    assert_true(has_finding(&f, 0, "is incomplete"));
     sqlite3_close(db);
 }
 
@@ -737,7 +738,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(sound_terrains_have_no_findings),
         cmocka_unit_test(every_damage_is_found_where_it_is),
-        cmocka_unit_test(incomplete_is_a_warning_and_all_else_an_error),
+        cmocka_unit_test(incomplete_is_the_only_finding_of_an_incomplete_terrain),
         cmocka_unit_test(an_outline_bit_that_is_lost_beside_a_void_is_found),
         cmocka_unit_test(a_block_that_answers_nothing_must_not_be_indexed),
         cmocka_unit_test(check_stops_when_told_to_and_lets_the_connection_close),

@@ -10,7 +10,7 @@ static const char HELP[] =
     "Usage: rqt check [--terrain T] DATABASE\n"
     "\n"
     "Looks at every block, its checksum and its place in the index, and says what is wrong. Exit status 1 when a\n"
-    "terrain is damaged. An import that did not finish is a warning: queries refuse that terrain anyway.\n"
+    "terrain is damaged, or its import did not finish.\n"
     "\n"
     "Options:\n"
     "  --terrain T     this terrain only (default: all)\n"

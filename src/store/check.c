@@ -604,7 +604,7 @@ int store_check(store *s, const store_terrain *t, bool (*tell_one)(void *context
                .error = error};
     if (!t->complete) {
         /* Nothing more is promised of it. */
-        tell(&c, "warning", 0, "is incomplete: its import did not finish");
+        tell(&c, "error", 0, "is incomplete: its import did not finish");
         return c.code;
     }
     if (!create(&c)) c.code = SQLITE_NOMEM;

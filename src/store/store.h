@@ -97,7 +97,7 @@ int store_window(store *s, const store_terrain *t, int32_t col, int32_t row, int
 int store_height(store *s, const store_terrain *t, double x, double y, double eps, double *metres, bool *found,
                  char **error);
 
-/* How far check has come, and what it found: severity "error" or "warning", block 0 when it is not about one. */
+/* How far check has come, and what it found: severity (so far always "error"), block 0 when it is not about one. */
 typedef struct store_finding {
     const char *severity;
     rqt_block_number block;

@@ -189,4 +189,12 @@ SELECT rqt_height(2, -2, 1, 'tent');
 SELECT name, complete FROM rqt_terrains;
 --> tent|0
 SELECT severity, message FROM rqt_check;
---> warning|terrain tent is incomplete: its import did not finish
+--> error|terrain tent is incomplete: its import did not finish
+
+-- An argument too many is an error, not a filter on a hidden column.
+SELECT count(*) FROM rqt_range(NULL, 1, 'tent', NULL, 5);
+--! rqt_range(): too many arguments
+SELECT count(*) FROM rqt_terrains('x');
+--! rqt_terrains(): too many arguments
+SELECT count(*) FROM rqt_range(NULL, 0, 'tent') WHERE +col = 0 AND +row = 0;
+--> 1
