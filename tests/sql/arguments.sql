@@ -196,5 +196,5 @@ SELECT count(*) FROM rqt_range(NULL, 1, 'tent', NULL, 5);
 --! rqt_range(): too many arguments
 SELECT count(*) FROM rqt_terrains('x');
 --! rqt_terrains(): too many arguments
-SELECT count(*) FROM rqt_range(NULL, 0, 'tent') WHERE +col = 0 AND +row = 0;
+SELECT count(*) FROM rqt_terrains WHERE +k > 0;
 --> 1
