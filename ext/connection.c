@@ -14,6 +14,7 @@ struct connection {
     store *store;
     int holders;
     bool owned; /* rqt_terrains is connected */
+    bool busy;  /* a call of ours is under way */
 };
 
 connection *connection_create(sqlite3 *db) {
@@ -44,6 +45,9 @@ void connection_owner(connection *c, bool owned) {
 }
 
 int connection_store(connection *c, store **s, char **error) {
+    /* Arguments are worked out before a call begins, so calls never overlap, unless a table of a terrain is really
+     * a view that calls us back: it would run the very statements that are running. */
+    if (c->busy) return fail(error, "rqt is already at work: a table of the terrain is a view that calls rqt");
     if (!c->store) {
         const int code = store_open(c->db, &c->store);
         if (code != SQLITE_OK) return code;
@@ -55,11 +59,14 @@ int connection_store(connection *c, store **s, char **error) {
         if ((code & 0xFF) == SQLITE_NOMEM) return SQLITE_NOMEM;
     }
     const int code = store_begin(c->store, error);
-    if (code == SQLITE_OK) *s = c->store;
-    return code;
+    if (code != SQLITE_OK) return code;
+    *s = c->store;
+    c->busy = true;
+    return SQLITE_OK;
 }
 
 void connection_done(connection *c) {
+    c->busy = false;
     store_end(c->store);
     if (!c->owned) store_release(c->store);
 }

@@ -56,6 +56,7 @@ int table_register(connection *c, const function *f);
 /* Put "name(): sentence" (or what code says) as the result of a scalar, and release the sentence. scalar.c */
 void scalar_error(sqlite3_context *result, const char *name, int code, char *sentence);
 /* connection.c */
+connection *connection_create(sqlite3 *db);
 void connection_hold(connection *c);
 void connection_release(void *c);
 void connection_owner(connection *c, bool owned);

@@ -24,6 +24,10 @@ static void text(sqlite3_context *result, const char *value) {
 
 static void terrains_column(void *data, size_t row, int column, sqlite3_context *result) {
     const store_terrain *t = &((terrain_list *)data)->rows[row];
+    if (t->problem && column > 0 && column != 13) {
+        if (column == 14) sqlite3_result_int(result, 0);
+        return; /* nothing else is known */
+    }
     const double a = rqt_unit_metres(&t->unit, t->min_q), b = rqt_unit_metres(&t->unit, t->max_q);
     const bool has_heights = t->voids < (int64_t)t->lattice.width * t->lattice.height;
     switch (column) {

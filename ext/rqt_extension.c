@@ -7,8 +7,6 @@
 SQLITE_EXTENSION_INIT1
 #endif
 
-connection *connection_create(sqlite3 *db);
-
 static int register_scalar(connection *c, const function *f) {
     int code = SQLITE_OK;
     for (int n = f->least; n <= f->most && code == SQLITE_OK; n++) {
@@ -25,6 +23,11 @@ int sqlite3_rqt_init(sqlite3 *db, char **error, const sqlite3_api_routines *api)
 #else
     (void)api;
 #endif
+    if (sqlite3_libversion_number() < 3039000) {
+        if (error)
+            *error = sqlite3_mprintf("rqt needs SQLite 3.39 or newer; this program has %s", sqlite3_libversion());
+        return SQLITE_ERROR;
+    }
     connection *c = connection_create(db);
     if (!c) return SQLITE_NOMEM;
     int code = SQLITE_OK;

@@ -98,6 +98,7 @@ static int connect(sqlite3 *db, void *client, int argc, const char *const *argv,
         sqlite3_free(t);
         return code;
     }
+    connection_hold(t->connection); /* the module may go before its tables */
     if (m->function->keeps_statements) connection_owner(t->connection, true);
     *out = &t->base;
     return SQLITE_OK;
@@ -106,6 +107,7 @@ static int connect(sqlite3 *db, void *client, int argc, const char *const *argv,
 static int disconnect(sqlite3_vtab *base) {
     table *t = (table *)base;
     if (t->function->keeps_statements) connection_owner(t->connection, false);
+    connection_release(t->connection);
     sqlite3_free(t);
     return SQLITE_OK;
 }

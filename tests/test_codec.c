@@ -1003,12 +1003,12 @@ static void a_block_is_needed_iff_its_centre_is_selected(void **state) {
             s.center_error = 100;
             s.center_flags = flags;
             const bool outline = flags & RQT_OUTLINE;
-            assert_true(rqt_summary_needs_block(&s, level, RQT_OUTLINE_TOL, 99));
-            assert_false(rqt_summary_needs_block(&s, level, RQT_OUTLINE_TOL, 100));
-            assert_true(rqt_summary_needs_block(&s, level, RQT_OUTLINE_EXACT, 99));
-            assert_int_equal(rqt_summary_needs_block(&s, level, RQT_OUTLINE_EXACT, 100), outline);
+            assert_true(rqt_summary_needs_block(&s, RQT_OUTLINE_TOL, 99));
+            assert_false(rqt_summary_needs_block(&s, RQT_OUTLINE_TOL, 100));
+            assert_true(rqt_summary_needs_block(&s, RQT_OUTLINE_EXACT, 99));
+            assert_int_equal(rqt_summary_needs_block(&s, RQT_OUTLINE_EXACT, 100), outline);
             s.center_error = 0;
-            assert_false(rqt_summary_needs_block(&s, level, RQT_OUTLINE_TOL, 0));
+            assert_false(rqt_summary_needs_block(&s, RQT_OUTLINE_TOL, 0));
         }
 }
 

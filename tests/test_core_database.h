@@ -88,7 +88,7 @@ static inline const rqt_block *database_read(void *context, rqt_block_number num
         const stored *s = &d->block[n];
         if (s->number != number) continue;
         if (d->corrupt) return NULL;
-        CHECK(rqt_summary_needs_block(&s->summary, s->place.level, d->asking->outline, d->asking->eps),
+        CHECK(rqt_summary_needs_block(&s->summary, d->asking->outline, d->asking->eps),
               "block %llu was read though its summary is enough", (unsigned long long)number);
         d->reads++;
         /* valid until the next call only: the block before is gone */

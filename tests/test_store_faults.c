@@ -240,7 +240,7 @@ static void every_byte_of_a_block_and_of_a_summary_counts(void **state) {
                 bytes[i] ^= (uint8_t)(1 << bit);
                 set_bytes(db, columns[c], 1, bytes, size);
                 const answer a = query_store(s, "t", 0, by_threshold, NULL);
-                CHECK(a.code == SQLITE_CORRUPT && a.triangles == 0, "%s, byte %zu, bit %d: %d, %zu triangles",
+                CHECK(a.code == SQLITE_CORRUPT_VTAB && a.triangles == 0, "%s, byte %zu, bit %d: %d, %zu triangles",
                       columns[c], i, bit, a.code, a.triangles);
                 CHECK(strstr(a.error, "block 1") && strstr(a.error, "damaged"), "it says: %s", a.error);
                 bytes[i] ^= (uint8_t)(1 << bit);
@@ -249,7 +249,8 @@ static void every_byte_of_a_block_and_of_a_summary_counts(void **state) {
         for (size_t length = 0; length < size; length++) {
             set_bytes(db, columns[c], 1, bytes, length);
             const answer a = query_store(s, "t", 0, by_threshold, NULL);
-            CHECK(a.code == SQLITE_CORRUPT && a.triangles == 0, "%s cut at %zu: %d", columns[c], length, a.code);
+            CHECK(a.code == SQLITE_CORRUPT_VTAB && a.triangles == 0, "%s cut at %zu: %d", columns[c], length,
+                  a.code);
         }
         set_bytes(db, columns[c], 1, bytes, size);
         const answer a = query_store(s, "t", 0, by_threshold, NULL);
@@ -340,8 +341,8 @@ static void a_hole_in_the_index_is_noticed_by_points_and_lines(void **state) {
         assert_int_equal(store_open(db, &s), SQLITE_OK);
         for (int n = 0; n < 3; n++) {
             const answer a = query_region(s, "t", regions[n], 0, by_threshold, NULL);
-            CHECK(a.code == (broken ? SQLITE_CORRUPT : SQLITE_OK), "%s, %s index: %d, %zu triangles", regions[n],
-                  broken ? "empty" : "whole", a.code, a.triangles);
+            CHECK(a.code == (broken ? SQLITE_CORRUPT_VTAB : SQLITE_OK), "%s, %s index: %d, %zu triangles",
+                  regions[n], broken ? "empty" : "whole", a.code, a.triangles);
             assert_int_equal(a.triangles == 0, broken);
         }
         assert_int_equal(store_find(s, "t", &t, NULL), SQLITE_OK);
@@ -349,7 +350,7 @@ static void a_hole_in_the_index_is_noticed_by_points_and_lines(void **state) {
         bool found;
         char *error = NULL;
         const int code = store_height(s, t, 1100, 1900, 1, &metres, &found, &error);
-        assert_int_equal(code, broken ? SQLITE_CORRUPT : SQLITE_OK);
+        assert_int_equal(code, broken ? SQLITE_CORRUPT_VTAB : SQLITE_OK);
         assert_int_equal(found, !broken);
         sqlite3_free(error);
         store_close(s);
@@ -522,7 +523,7 @@ static void a_transaction_of_our_own_is_seen_and_its_rollback_too(void **state) 
             CHECK(same_answer(&a, &fresh), "inside the transaction: %d %s", a.code, a.error);
             run(db, "SAVEPOINT inner; DELETE FROM rqt_block_%s", ask(db, "SELECT id FROM rqt_terrain"));
             a = query_store(s, "t", 0, by_threshold, NULL);
-            assert_int_equal(a.code, SQLITE_CORRUPT);
+            assert_int_equal(a.code, SQLITE_CORRUPT_VTAB);
             run(db, "ROLLBACK TO inner");
             a = query_store(s, "t", 0, by_threshold, NULL);
             CHECK(same_answer(&a, &fresh), "after the savepoint: %d %s", a.code, a.error);
@@ -551,7 +552,7 @@ static void vacuum_and_close_succeed_after_queries(void **state) {
     assert_true(same_answer(&before, &after));
     run(db, "UPDATE rqt_block_1 SET data = x'00'");
     after = query_store(s, "t", 0, by_threshold, NULL); /* an error leaves no cursor open either */
-    assert_int_equal(after.code, SQLITE_CORRUPT);
+    assert_int_equal(after.code, SQLITE_CORRUPT_VTAB);
     run(db, "VACUUM");
     run(db, "DROP TABLE rqt_index_1");
     store_release(s);

@@ -11,10 +11,17 @@
 #define DROPPED 45               /* bits of a double's mantissa that a code has not */
 #define BIAS ((int64_t)767 << 7) /* double's exponent bias less the code's, in code units */
 
+/* Then every error has a finite code of its own, and every height is a finite number of metres. */
+static bool quantum_is_usable(const rqt_unit *unit) {
+    const double quantum = fabs(rqt_unit_factor(unit)) / unit->d;
+    return quantum > 0x1p-200 && quantum < 0x1p200;
+}
+
 bool rqt_unit_is_valid(const rqt_unit *unit) {
     return unit->d >= 1 && unit->d <= 1 << 20 && unit->numerator > 0 && unit->numerator <= 1 << 20 &&
            unit->denominator > 0 && unit->denominator <= 1 << 20 && isfinite(unit->scale) && unit->scale != 0 &&
-           isfinite(unit->offset) && unit->z0 < (INT64_C(1) << 53) && unit->z0 > -(INT64_C(1) << 53);
+           isfinite(unit->offset) && quantum_is_usable(unit) && unit->z0 < (INT64_C(1) << 53) &&
+           unit->z0 > -(INT64_C(1) << 53);
 }
 
 double rqt_unit_factor(const rqt_unit *unit) {

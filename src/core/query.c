@@ -94,7 +94,7 @@ static uint32_t append_vertex(walk *w, const corner *c, rqt_vertex sample, uint8
     return (uint32_t)patch->vertex_count++;
 }
 
-/* Is this lattice vertex the only one of its sample, and of no other block? */
+/* May another block, or another lattice vertex, be the same sample? */
 static bool is_shared(const walk *w, rqt_vertex v) {
     const rqt_block_place *p = &w->place;
     return v.x <= p->x || v.y <= p->y || v.x >= p->x + p->side || v.y >= p->y + p->side ||
@@ -347,7 +347,7 @@ static rqt_status close_selection(walk *w) {
         status = rqt_block_locate(&query->lattice, query->k, answer->number, &place);
         if (status != RQT_OK) break;
         const rqt_block *block = NULL;
-        if (rqt_summary_needs_block(&answer->summary, place.level, query->outline, query->eps)) {
+        if (rqt_summary_needs_block(&answer->summary, query->outline, query->eps)) {
             block = query->read_block(query->context, answer->number);
             if (!block) status = RQT_READ_FAILED;
         }
@@ -404,6 +404,14 @@ static rqt_status run(walk *w) {
     for (size_t b = 0; b < query->answer_count; b++)
         if (rqt_block_locate(&query->lattice, query->k, query->answers[b].number, &w->place) != RQT_OK)
             return RQT_CORRUPT;
+    /* The caller sums their areas; that they are disjoint too makes them a partition. */
+    for (size_t b = 1; b < query->answer_count; b++) {
+        const rqt_block_number before = query->answers[b - 1].number;
+        const int level = (63 - __builtin_clzll(before)) / 2;
+        if (morton_order(w, query->answers[b].number) - morton_order(w, before) <
+            UINT64_C(1) << (2 * (w->fine_levels - 1 - level)))
+            return RQT_CORRUPT;
+    }
     if (query->select != RQT_SELECT_THRESHOLD) {
         const rqt_status status = close_selection(w);
         if (status != RQT_OK) return status;
@@ -413,7 +421,7 @@ static rqt_status run(walk *w) {
         if (query->is_interrupted && query->is_interrupted(query->context)) return RQT_INTERRUPTED;
         (void)rqt_block_locate(&query->lattice, query->k, answer->number, &w->place);
         w->block = NULL;
-        if (rqt_summary_needs_block(&answer->summary, w->place.level, query->outline, query->eps)) {
+        if (rqt_summary_needs_block(&answer->summary, query->outline, query->eps)) {
             w->block = query->read_block(query->context, answer->number);
             if (!w->block) return RQT_READ_FAILED;
             if (w->block->k != query->k) return RQT_CORRUPT;

@@ -98,8 +98,8 @@ typedef struct rqt_unit {
     int64_t z0;                     /* |z0| < 2^53 */
     int32_t d;                      /* quanta in one unit, 1 .. 2^20 */
     int32_t numerator, denominator; /* the unit in metres where it is a named one: 1/1, 381/1250, 1200/3937 */
-    double scale;                   /* finite, not 0: band scale times the unit where that is a plain number */
-    double offset;                  /* metres, finite */
+    double scale;  /* band scale times the unit where that is a plain number; 2^-200 < |f|/d < 2^200 */
+    double offset; /* metres, finite */
 } rqt_unit;
 
 #define RQT_HEIGHT_LIMIT (1 << 30) /* |q| < this */
@@ -118,8 +118,8 @@ typedef uint16_t rqt_code;
 /* The value of a code, exactly; +infinity for RQT_CODE_INFINITY. */
 double rqt_code_metres(rqt_code code);
 /* The smallest code that is not below numerator/denominator height quanta, in metres: compared as exact
- * rationals, whatever the unit. Values above the largest finite code give it (errors beyond 2^255 m do not
- * occur: |q| < 2^30). denominator is 1 .. 2^42. */
+ * rationals, whatever the unit. Values above the largest finite code give it; a valid unit has
+ * none such. denominator is 1 .. 2^42. */
 rqt_code rqt_code_from_quanta(const rqt_unit *unit, uint64_t numerator_high, uint64_t numerator_low,
                               uint64_t denominator);
 /* The smallest code that is not below extent*cell/c, exactly: what a void outline costs. extent >= 0 samples,
@@ -398,7 +398,7 @@ typedef struct rqt_query {
 /* Does a block with this summary answer eps? */
 bool rqt_summary_answers(const rqt_summary *summary, rqt_outline outline, rqt_code eps);
 /* Does the query need this block's bytes, or is its summary enough? */
-bool rqt_summary_needs_block(const rqt_summary *summary, int level, rqt_outline outline, rqt_code eps);
+bool rqt_summary_needs_block(const rqt_summary *summary, rqt_outline outline, rqt_code eps);
 /* The patch of a query (mode `cover`): each kept leaf that belongs to the region, once. */
 rqt_status rqt_query_run(rqt_query *query, const rqt_allocator *allocator, rqt_patch *patch);
 

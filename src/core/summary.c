@@ -73,8 +73,7 @@ bool rqt_summary_answers(const rqt_summary *summary, rqt_outline outline, rqt_co
  * on the centre and on the neighbour's. So in a closed set none of them is selected when the centre is not, and the
  * corners, which the summary holds, are all there is. The same at every level: the root has four corners as well.
  * Blocks of k = 0 have no centre; their summary says error 0 and no flags. */
-bool rqt_summary_needs_block(const rqt_summary *summary, int level, rqt_outline outline, rqt_code eps) {
-    (void)level;
+bool rqt_summary_needs_block(const rqt_summary *summary, rqt_outline outline, rqt_code eps) {
     if (outline == RQT_OUTLINE_EXACT && summary->center_flags & RQT_OUTLINE) return true;
     return summary->center_error > eps;
 }

@@ -602,6 +602,11 @@ int store_check(store *s, const store_terrain *t, bool (*tell_one)(void *context
                .tell = tell_one,
                .context = context,
                .error = error};
+    if (t->problem) {
+        const store_finding unusable = {"error", 0, t->problem};
+        (void)tell_one(context, &unusable);
+        return SQLITE_OK;
+    }
     if (!t->complete) {
         /* Nothing more is promised of it. */
         tell(&c, "error", 0, "is incomplete: its import did not finish");

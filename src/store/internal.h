@@ -16,9 +16,6 @@ int store_read_terrains(sqlite3 *db, store_terrain **terrains, int *count, char 
 /* A new row with complete = 0. terrain.c */
 int store_insert_terrain(sqlite3 *db, const store_terrain *t, int64_t *id, char **error);
 
-/* The bytes of one block, as a pointer that is valid until the next call; for check.c. reader.c */
-int store_block_bytes(store *s, const store_terrain *t, rqt_block_number number, const uint8_t **bytes, int *size,
-                      char **error);
 sqlite3 *store_connection(const store *s);
 /* A sentence for a status of the core. */
 int store_fail_core(char **error, rqt_status status, const char *doing);

@@ -28,6 +28,7 @@ struct store {
     bool known;                         /* terrains are read, and the cache holds only what is theirs */
     uint64_t version;                   /* of all databases, when they were read */
     sqlite3_stmt *held[MOST_DATABASES]; /* statements that hold a database as it is */
+    sqlite3_stmt *probe;                /* asks whether we are interrupted */
     int holders;                        /* calls of store_begin that have not ended */
     block_cache *cache;
     rqt_codec *codec;
@@ -42,7 +43,7 @@ int store_fail_core(char **error, rqt_status status, const char *doing) {
     case RQT_INTERRUPTED:
         return SQLITE_INTERRUPT;
     case RQT_CORRUPT:
-        return store_fail(error, SQLITE_CORRUPT, "%s: damaged bytes", doing);
+        return store_fail(error, SQLITE_CORRUPT_VTAB, "%s: damaged bytes", doing);
     case RQT_READ_FAILED:
         return SQLITE_ERROR; /* the callback has left its sentence */
     default:
@@ -76,16 +77,23 @@ static void finalize(statements *p) {
     memset(p, 0, sizeof *p);
 }
 
+static void finalize_all(store *s) {
+    for (int i = 0; i < s->count; i++) finalize(&s->statements[i]);
+}
+
 void store_release(store *s) {
+    finalize_all(s);
     for (int i = 0; i < MOST_DATABASES; i++) {
         sqlite3_finalize(s->held[i]);
         s->held[i] = NULL;
     }
-    for (int i = 0; i < s->count; i++) finalize(&s->statements[i]);
+    sqlite3_finalize(s->probe);
+    s->probe = NULL;
+    s->known = false; /* nobody counts what happens from here on */
 }
 
 static void forget(store *s) {
-    store_release(s);
+    finalize_all(s);
     sqlite3_free(s->statements);
     store_terrains_free(s->terrains, s->count);
     s->statements = NULL;
@@ -97,6 +105,7 @@ static void forget(store *s) {
 
 void store_close(store *s) {
     if (!s) return;
+    store_release(s);
     if (s->cache) forget(s);
     block_cache_free(s->cache);
     rqt_codec_free(s->codec);
@@ -112,7 +121,9 @@ int store_begin(store *s, char **error) {
     for (int i = 0; i < MOST_DATABASES && code == SQLITE_OK; i++) {
         const char *name = sqlite3_db_name(s->db, i);
         if (!name) break;
-        if (i == 1 || sqlite3_txn_state(s->db, name) != SQLITE_TXN_NONE) continue; /* 1: temp */
+        /* The main database's statement runs always: that a DETACH makes it prepare itself again is how we learn of
+         * it. */
+        if (i == 1 || (i > 1 && sqlite3_txn_state(s->db, name) != SQLITE_TXN_NONE)) continue; /* 1: temp */
         if (!s->held[i]) {
             char *sql = sqlite3_mprintf("SELECT 1 FROM \"%w\".sqlite_schema LIMIT 1", name);
             code = sql ? sqlite3_prepare_v3(s->db, sql, -1, SQLITE_PREPARE_PERSISTENT, &s->held[i], NULL)
@@ -137,6 +148,11 @@ void store_end(store *s) {
     }
 }
 
+static uint64_t mix_text(uint64_t h, const char *text) {
+    while (text && *text) h = (h ^ (uint8_t)*text++) * UINT64_C(0x100000001B3);
+    return (h ^ 0xFF) * UINT64_C(0xC2B2AE3D27D4EB4F);
+}
+
 /* A number that changes when any database of the connection does, or one is attached or detached. */
 static uint64_t version_of(const store *s, bool *writing) {
     sqlite3 *db = s->db;
@@ -144,14 +160,15 @@ static uint64_t version_of(const store *s, bool *writing) {
     *writing = false;
     for (int i = 0;; i++) {
         const char *name = sqlite3_db_name(db, i);
-        if (!name) return h;
+        if (!name) break;
         if (i == 1) continue; /* temp */
         unsigned version = 0;
         (void)sqlite3_file_control(db, name, SQLITE_FCNTL_DATA_VERSION, &version);
         h = (h ^ version) * UINT64_C(0x9E3779B97F4A7C15);
-        h = (h ^ (uint64_t)(uintptr_t)sqlite3_db_filename(db, name)) * UINT64_C(0xC2B2AE3D27D4EB4F);
+        h = mix_text(mix_text(h, name), sqlite3_db_filename(db, name));
         if (sqlite3_txn_state(db, name) == SQLITE_TXN_WRITE) *writing = true;
     }
+    return h ^ (uint64_t)(s->held[0] ? sqlite3_stmt_status(s->held[0], SQLITE_STMTSTATUS_REPREPARE, 0) : 0);
 }
 
 static int refresh(store *s, char **error) {
@@ -213,6 +230,7 @@ static int find(store *s, const char *name, const store_terrain **terrain, char 
                 if (strcmp(found->schema, "main") == 0) matches = 1;
             }
     }
+    if (matches == 1 && found->problem) return store_fail(error, SQLITE_CORRUPT_VTAB, "%s", found->problem);
     if (matches == 1 && !found->complete)
         return store_fail(error, SQLITE_ERROR, "terrain %s is incomplete: its import did not finish", found->name);
     if (matches == 1) {
@@ -282,8 +300,8 @@ static int answers_statement(store *s, const store_terrain *t, rqt_outline outli
     return code;
 }
 
-int store_block_bytes(store *s, const store_terrain *t, rqt_block_number number, const uint8_t **bytes, int *size,
-                      char **error) {
+static int block_bytes(store *s, const store_terrain *t, rqt_block_number number, const uint8_t **bytes, int *size,
+                       char **error) {
     sqlite3_stmt **kept = &statements_of(s, t)->bytes;
     *bytes = NULL;
     *size = 0;
@@ -306,7 +324,7 @@ int store_block_bytes(store *s, const store_terrain *t, rqt_block_number number,
         return store_fail_db(error, s->db, code, "reading a block");
     }
     sqlite3_reset(*kept);
-    return store_fail(error, SQLITE_CORRUPT, "terrain %s is damaged: block %llu is missing", t->name, number);
+    return store_fail(error, SQLITE_CORRUPT_VTAB, "terrain %s is damaged: block %llu is missing", t->name, number);
 }
 
 /* The decoded block, from the cache or the database. *read: bytes read now, 0 when it was cached. */
@@ -318,18 +336,18 @@ static int get_block(store *s, const store_terrain *t, rqt_block_number number, 
     if (*block) return SQLITE_OK;
     const uint8_t *bytes;
     int size;
-    int code = store_block_bytes(s, t, number, &bytes, &size, error);
+    int code = block_bytes(s, t, number, &bytes, &size, error);
     if (code != SQLITE_OK) return code;
     rqt_block_header header;
     rqt_message why = {""};
     rqt_block_place place;
     rqt_block *fresh = NULL;
     if (rqt_block_info(bytes, (size_t)size, &header, &why) != RQT_OK) {
-        code =
-            store_fail(error, SQLITE_CORRUPT, "terrain %s is damaged: block %llu: %s", t->name, number, why.text);
+        code = store_fail(error, SQLITE_CORRUPT_VTAB, "terrain %s is damaged: block %llu: %s", t->name, number,
+                          why.text);
     } else if (rqt_block_locate(&t->lattice, t->k, number, &place) != RQT_OK || header.k != t->k ||
                header.width != place.width || header.height != place.height) {
-        code = store_fail(error, SQLITE_CORRUPT, "terrain %s is damaged: block %llu does not fit its place",
+        code = store_fail(error, SQLITE_CORRUPT_VTAB, "terrain %s is damaged: block %llu does not fit its place",
                           t->name, number);
     } else {
         fresh = block_cache_add(s->cache, key, number, t->k);
@@ -337,8 +355,8 @@ static int get_block(store *s, const store_terrain *t, rqt_block_number number, 
         if (status == RQT_NO_MEMORY)
             code = SQLITE_NOMEM;
         else if (status != RQT_OK)
-            code = store_fail(error, SQLITE_CORRUPT, "terrain %s is damaged: block %llu: its bytes do not decode",
-                              t->name, number);
+            code = store_fail(error, SQLITE_CORRUPT_VTAB,
+                              "terrain %s is damaged: block %llu: its bytes do not decode", t->name, number);
         if (code != SQLITE_OK && fresh) block_cache_forget(s->cache, key, number);
     }
     sqlite3_reset(statements_of(s, t)->bytes);
@@ -374,6 +392,7 @@ static int find_answers(store *s, const store_terrain *t, const int32_t box[4], 
         else
             proof[a]--;
     }
+    const int64_t wanted = (int64_t)(proof[1] - proof[0]) * (proof[3] - proof[2]);
     while ((code = sqlite3_step(row)) == SQLITE_ROW) {
         if (list->count == list->capacity) {
             const size_t more = list->capacity ? 2 * list->capacity : 64;
@@ -393,19 +412,20 @@ static int find_answers(store *s, const store_terrain *t, const int32_t box[4], 
         if (!bytes || rqt_summary_decode(bytes, (size_t)size, &answer->summary) != RQT_OK ||
             !rqt_summary_answers(&answer->summary, outline, eps) ||
             rqt_block_locate(&t->lattice, t->k, answer->number, &p) != RQT_OK) {
-            code = store_fail(error, SQLITE_CORRUPT, "terrain %s is damaged: the summary of block %lld", t->name,
-                              (sqlite3_int64)answer->number);
+            code = store_fail(error, SQLITE_CORRUPT_VTAB, "terrain %s is damaged: the summary of block %lld",
+                              t->name, (sqlite3_int64)answer->number);
             break;
         }
         const int64_t x0 = p.x > proof[0] ? p.x : proof[0], x1 = p.x + p.side < proof[1] ? p.x + p.side : proof[1];
         const int64_t y0 = p.y > proof[2] ? p.y : proof[2], y1 = p.y + p.side < proof[3] ? p.y + p.side : proof[3];
         if (x1 > x0 && y1 > y0) covered += (x1 - x0) * (y1 - y0);
         list->count++;
+        if (covered > wanted) break; /* blocks over one another */
     }
     sqlite3_reset(row);
-    if (code == SQLITE_DONE) {
-        if (covered == (int64_t)(proof[1] - proof[0]) * (proof[3] - proof[2])) return SQLITE_OK;
-        return store_fail(error, SQLITE_CORRUPT,
+    if (code == SQLITE_DONE || (code == SQLITE_ROW && covered > wanted)) {
+        if (covered == wanted) return SQLITE_OK; /* and the query sees that they are disjoint */
+        return store_fail(error, SQLITE_CORRUPT_VTAB,
                           "terrain %s is damaged: its index does not cover the region; see rqt_check", t->name);
     }
     if (!*error && code != SQLITE_NOMEM) code = store_fail_db(error, s->db, code, "reading the index");
@@ -431,6 +451,22 @@ static int64_t count_selected(const rqt_query *query, const rqt_block *block) {
     return count;
 }
 
+/* A row per answer, as answered from its index row; the query has sorted them. */
+static int begin_reads(const rqt_query *query, store_reads *reads) {
+    reads->rows = sqlite3_malloc64((query->answer_count + 1) * sizeof *reads->rows);
+    if (!reads->rows) return SQLITE_NOMEM;
+    reads->count = query->answer_count;
+    for (size_t i = 0; i < reads->count; i++) {
+        const rqt_summary *summary = &query->answers[i].summary;
+        int64_t selected = 0;
+        for (int c = 0; c < 4; c++)
+            selected += summary->corner[c].error > query->eps ||
+                        (query->outline == RQT_OUTLINE_EXACT && (summary->corner[c].flags & RQT_OUTLINE));
+        reads->rows[i] = (store_read){query->answers[i].number, false, false, 0, selected};
+    }
+    return SQLITE_OK;
+}
+
 static const rqt_block *read_block(void *context, rqt_block_number number) {
     reading *r = context;
     const rqt_block *block;
@@ -438,18 +474,19 @@ static const rqt_block *read_block(void *context, rqt_block_number number) {
     r->code = get_block(r->store, r->terrain, number, &block, &read, r->error);
     if (r->code != SQLITE_OK) return NULL;
     if (r->reads) {
-        /* Blocks come in the order of the answers, once or (closing first) twice. */
-        size_t i = 0;
-        while (i < r->reads->count && r->reads->rows[i].number != number) i++;
-        if (i < r->reads->count && !r->reads->rows[i].needs_bytes) {
+        /* Blocks come in the order of the answers, once, or twice when a selection is closed first. */
+        if (!r->reads->rows && (r->code = begin_reads(r->query, r->reads)) != SQLITE_OK) return NULL;
+        while (r->reads->rows[r->next].number != number) r->next = (r->next + 1) % r->reads->count;
+        store_read *row = &r->reads->rows[r->next];
+        if (!row->needs_bytes) {
             const uint8_t *bytes;
             int size = read;
             if (!read) {
-                r->code = store_block_bytes(r->store, r->terrain, number, &bytes, &size, r->error);
+                r->code = block_bytes(r->store, r->terrain, number, &bytes, &size, r->error);
                 sqlite3_reset(statements_of(r->store, r->terrain)->bytes);
                 if (r->code != SQLITE_OK) return NULL;
             }
-            r->reads->rows[i] = (store_read){number, true, read == 0, size, count_selected(r->query, block)};
+            *row = (store_read){number, true, read == 0, size, count_selected(r->query, block)};
         }
     }
     return block;
@@ -458,46 +495,19 @@ static const rqt_block *read_block(void *context, rqt_block_number number) {
 static bool is_interrupted(void *context) {
     /* SQLite 3.40 tells nobody that sqlite3_interrupt was called but a statement that runs: so run one. */
     reading *r = context;
-    sqlite3_stmt *probe = NULL;
-    int code = sqlite3_prepare_v2(r->store->db, "SELECT 1", -1, &probe, NULL);
-    if (code == SQLITE_OK) code = sqlite3_step(probe);
-    sqlite3_finalize(probe);
+    store *s = r->store;
+    int code = SQLITE_OK;
+    if (!s->probe) code = sqlite3_prepare_v3(s->db, "SELECT 1", -1, SQLITE_PREPARE_PERSISTENT, &s->probe, NULL);
+    if (code == SQLITE_OK) code = sqlite3_step(s->probe);
+    sqlite3_reset(s->probe);
     if (code == SQLITE_ROW) return false;
     r->code = code & 0xFF;
     return true;
 }
 
-static int begin_reads(const answer_list *list, const store_query_options *options, rqt_code eps,
-                       store_reads *reads) {
-    reads->rows = sqlite3_malloc64((list->count ? list->count : 1) * sizeof *reads->rows);
-    if (!reads->rows) return SQLITE_NOMEM;
-    reads->count = list->count;
-    for (size_t i = 0; i < list->count; i++) {
-        const rqt_summary *summary = &list->rows[i].summary;
-        int64_t selected = 0;
-        for (int c = 0; c < 4; c++)
-            selected += summary->corner[c].error > eps ||
-                        (options->outline == RQT_OUTLINE_EXACT && (summary->corner[c].flags & RQT_OUTLINE));
-        reads->rows[i] = (store_read){list->rows[i].number, false, false, 0, selected};
-    }
-    return SQLITE_OK;
-}
-
 void store_reads_free(store_reads *reads) {
     sqlite3_free(reads->rows);
     memset(reads, 0, sizeof *reads);
-}
-
-/* Rows into the order that the query gave its answers. */
-static void order_reads(store_reads *reads, const rqt_query *query) {
-    for (size_t i = 0; i < reads->count; i++) {
-        size_t j = i;
-        while (j < reads->count && reads->rows[j].number != query->answers[i].number) j++;
-        if (j == reads->count) continue;
-        const store_read swap = reads->rows[i];
-        reads->rows[i] = reads->rows[j];
-        reads->rows[j] = swap;
-    }
 }
 
 static int query(store *s, const store_terrain *t, const rqt_region *region, double eps,
@@ -511,7 +521,6 @@ static int query(store *s, const store_terrain *t, const rqt_region *region, dou
     answer_list list = {0};
     char *sentence = NULL;
     int code = find_answers(s, t, box, options->outline, code_eps, &list, &sentence);
-    if (code == SQLITE_OK && reads) code = begin_reads(&list, options, code_eps, reads);
     if (code == SQLITE_OK) {
         rqt_query query = {.lattice = t->lattice,
                            .k = t->k,
@@ -529,7 +538,7 @@ static int query(store *s, const store_terrain *t, const rqt_region *region, dou
         const rqt_status status = rqt_query_run(&query, store_allocator(), patch);
         code = status == RQT_READ_FAILED || status == RQT_INTERRUPTED ? r.code
                                                                       : store_fail_core(&sentence, status, "query");
-        if (code == SQLITE_OK && reads) order_reads(reads, &query);
+        if (code == SQLITE_OK && reads && !reads->rows) code = begin_reads(&query, reads);
     }
     sqlite3_free(list.rows);
     if (code != SQLITE_OK && reads) store_reads_free(reads);
@@ -653,7 +662,9 @@ static int full_height(store *s, const store_terrain *t, double col, double row,
 /* The plane of a triangle of the patch of the point. */
 static int mesh_height(store *s, const store_terrain *t, double x, double y, double col, double row, double eps,
                        double *metres, bool *found, char **error) {
-    uint8_t wkb[21] = {1, 1, 0, 0, 0};
+    const uint32_t point = 1; /* also tells this machine's byte order, which the first byte of WKB names */
+    uint8_t wkb[21] = {*(const uint8_t *)&point};
+    memcpy(wkb + 1, &point, 4);
     memcpy(wkb + 5, &x, 8);
     memcpy(wkb + 13, &y, 8);
     rqt_geometry *geometry = NULL;

@@ -6,8 +6,9 @@
  * The query side needs two things of an engine only: "the blocks of this terrain that meet this box and answer this
  * eps" (reader.c, answers) and "the bytes of block n" (reader.c, read_block). Nothing else here knows SQL.
  *
- * Results are SQLite's codes. With anything but SQLITE_OK, *error may hold a sentence, to be released with
- * sqlite3_free; without a sentence sqlite3_errstr(code) is the sentence (out of memory, interrupted).
+ * Results are SQLite's codes; damage to a terrain's own bytes is SQLITE_CORRUPT_VTAB, because plain SQLITE_CORRUPT
+ * would make SQLite give up the host's transaction. With anything but SQLITE_OK, *error may hold a sentence, to be
+ * released with sqlite3_free; without a sentence sqlite3_errstr(code) is the sentence (out of memory, interrupted).
  */
 #ifndef RQT_STORE_H
 #define RQT_STORE_H
@@ -26,7 +27,8 @@ typedef struct store_terrain {
     int64_t id;      /* N of rqt_block_N, rqt_index_N */
     char name[64];   /* [A-Za-z0-9_.-]{1,63} */
     char schema[64]; /* of the connection: "main" or an attached database's name */
-    bool complete;   /* false: an import did not finish; queries refuse it */
+    char *problem; /* NULL, or a sentence: its row cannot be used; then nothing else is known but name and schema */
+    bool complete; /* false: an import did not finish; queries refuse it */
     rqt_lattice lattice;
     int k;
     rqt_placement placement;

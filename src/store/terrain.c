@@ -67,7 +67,8 @@ static void free_texts(store_terrain *t) {
     sqlite3_free(t->vertical);
     sqlite3_free(t->source);
     sqlite3_free(t->created);
-    t->crs = t->vertical = t->source = t->created = NULL;
+    sqlite3_free(t->problem);
+    t->crs = t->vertical = t->source = t->created = t->problem = NULL;
 }
 
 void store_terrains_free(store_terrain *terrains, int count) {
@@ -79,18 +80,29 @@ static bool in_range(int64_t value, int64_t low, int64_t high) {
     return value >= low && value <= high;
 }
 
-static int read_row(sqlite3_stmt *row, const char *schema, store_terrain *t, char **error) {
+/* A row that cannot be used is remembered with a sentence: it must not keep anyone from the other terrains. */
+static int unusable(store_terrain *t, const char *format, ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    t->problem = sqlite3_vmprintf(format, arguments);
+    va_end(arguments);
+    return t->problem ? SQLITE_OK : SQLITE_NOMEM;
+}
+
+static int read_row(sqlite3_stmt *row, const char *schema, store_terrain *t) {
     memset(t, 0, sizeof *t);
     const char *name = (const char *)sqlite3_column_text(row, 1);
     t->id = sqlite3_column_int64(row, 0);
-    if (!name || !store_name_is_valid(name) || strlen(schema) >= sizeof t->schema)
-        return store_fail(error, SQLITE_CORRUPT, "row %lld of rqt_terrain has no usable name", t->id);
-    memcpy(t->name, name, strlen(name) + 1);
-    memcpy(t->schema, schema, strlen(schema) + 1);
+    sqlite3_snprintf(sizeof t->schema, t->schema, "%s", schema);
+    sqlite3_snprintf(sizeof t->name, t->name, "#%lld", t->id);
+    if (!name || !store_name_is_valid(name))
+        return unusable(t, "row %lld of rqt_terrain has no usable name", t->id);
+    sqlite3_snprintf(sizeof t->name, t->name, "%s", name);
+    if (strlen(schema) >= sizeof t->schema) return unusable(t, "terrain %s: its database's name is too long", name);
     const int64_t format = sqlite3_column_int64(row, 2);
     if (format != RQT_FORMAT_VERSION)
-        return store_fail(error, SQLITE_ERROR, "terrain %s has format %lld; this version reads format %d", name,
-                          format, RQT_FORMAT_VERSION);
+        return unusable(t, "terrain %s has format %lld; this version reads format %d", name, format,
+                        RQT_FORMAT_VERSION);
     t->complete = sqlite3_column_int64(row, 3) == 1;
     const int64_t k = sqlite3_column_int64(row, 6);
     t->placement = (rqt_placement){sqlite3_column_double(row, 7), sqlite3_column_double(row, 8),
@@ -105,7 +117,9 @@ static int read_row(sqlite3_stmt *row, const char *schema, store_terrain *t, cha
     else if (!in_range(k, t->lattice.K > 0, t->lattice.K < RQT_MAX_BLOCK_K ? t->lattice.K : RQT_MAX_BLOCK_K))
         wrong = "k";
     else if (!isfinite(t->placement.x0) || !isfinite(t->placement.y0) || !isfinite(t->placement.dx) ||
-             !isfinite(t->placement.dy) || t->placement.dx == 0 || t->placement.dy == 0)
+             !isfinite(t->placement.dy) || t->placement.dx == 0 || t->placement.dy == 0 ||
+             !isfinite(t->placement.x0 + t->lattice.width * t->placement.dx) ||
+             !isfinite(t->placement.y0 + t->lattice.height * t->placement.dy))
         wrong = "placement";
     else if (!in_range(d, 1, 1 << 20) || !in_range(numerator, 1, 1 << 20) || !in_range(denominator, 1, 1 << 20))
         wrong = "unit";
@@ -132,9 +146,7 @@ static int read_row(sqlite3_stmt *row, const char *schema, store_terrain *t, cha
         else if (!(t->cost.cell > 0) || !(t->cost.c > 0) || !isfinite(t->cost.cell) || !isfinite(t->cost.c))
             wrong = "cell or void_tol";
     }
-    if (wrong)
-        return store_fail(error, SQLITE_CORRUPT, "terrain %s: its row in rqt_terrain has an impossible %s", name,
-                          wrong);
+    if (wrong) return unusable(t, "terrain %s: its row in rqt_terrain has an impossible %s", name, wrong);
     t->srid = (int32_t)srid;
     t->lonlat = sqlite3_column_int64(row, 21) != 0;
     t->wgs84 = sqlite3_column_int64(row, 22) != 0;
@@ -153,9 +165,11 @@ static int read_row(sqlite3_stmt *row, const char *schema, store_terrain *t, cha
     return SQLITE_NOMEM;
 }
 
-/* Append the terrains of one schema of the connection. A schema without the table has none. */
+/* Append the terrains of one schema of the connection. A schema without the table, or with another program's table
+ * of that name, has none. */
 static int read_schema(sqlite3 *db, const char *schema, store_terrain **terrains, int *count, char **error) {
-    if (sqlite3_table_column_metadata(db, schema, "rqt_terrain", "id", NULL, NULL, NULL, NULL, NULL) != SQLITE_OK)
+    if (sqlite3_table_column_metadata(db, schema, "rqt_terrain", "unit_numerator", NULL, NULL, NULL, NULL, NULL) !=
+        SQLITE_OK)
         return SQLITE_OK;
     char *sql = sqlite3_mprintf("SELECT " COLUMNS " FROM \"%w\".rqt_terrain ORDER BY name", schema);
     if (!sql) return SQLITE_NOMEM;
@@ -168,7 +182,7 @@ static int read_schema(sqlite3 *db, const char *schema, store_terrain **terrains
         code = more ? SQLITE_OK : SQLITE_NOMEM;
         if (more) {
             *terrains = more;
-            code = read_row(row, schema, &more[*count], error);
+            code = read_row(row, schema, &more[*count]);
         }
         if (code != SQLITE_OK) break;
         ++*count;
@@ -184,16 +198,13 @@ static int read_schema(sqlite3 *db, const char *schema, store_terrain **terrains
 int store_read_terrains(sqlite3 *db, store_terrain **terrains, int *count, char **error) {
     *terrains = NULL;
     *count = 0;
-    sqlite3_stmt *list = NULL;
-    int code = sqlite3_prepare_v2(db, "SELECT name FROM pragma_database_list ORDER BY seq", -1, &list, NULL);
-    if (code != SQLITE_OK) return store_fail_db(error, db, code, "listing databases");
-    while ((code = sqlite3_step(list)) == SQLITE_ROW) {
-        const char *schema = (const char *)sqlite3_column_text(list, 0);
-        code = schema ? read_schema(db, schema, terrains, count, error) : SQLITE_NOMEM;
-        if (code != SQLITE_OK) break;
+    int code = SQLITE_OK;
+    for (int i = 0; code == SQLITE_OK; i++) {
+        const char *schema = sqlite3_db_name(db, i);
+        if (!schema) break;
+        if (i != 1)
+            code = read_schema(db, schema, terrains, count, error); /* 1 is temp: not watched, so not served */
     }
-    sqlite3_finalize(list);
-    if (code == SQLITE_DONE) code = SQLITE_OK;
     if (code != SQLITE_OK) {
         store_terrains_free(*terrains, *count);
         *terrains = NULL;
