@@ -538,6 +538,32 @@ static void a_transaction_of_our_own_is_seen_and_its_rollback_too(void **state) 
     }
 }
 
+/* A rollback of rows alone changes no schema and no version: only that nothing is kept while we write helps. */
+static void rows_that_we_change_and_roll_back_are_not_remembered(void **state) {
+    (void)state;
+    sqlite3 *db = open_database(":memory:");
+    put_terrain(db, "t", 18, 7, 2, 1, false);
+    store *s;
+    assert_int_equal(store_open(db, &s), SQLITE_OK);
+    double heights[3];
+    const char *const before[3] = {
+        "SELECT 1", "BEGIN IMMEDIATE; UPDATE rqt_terrain SET height_offset = height_offset + 1000", "ROLLBACK"};
+    for (int step = 0; step < 3; step++) {
+        const store_terrain *t;
+        char *error = NULL;
+        bool found;
+        run(db, before[step]);
+        assert_int_equal(store_find(s, "t", &t, &error), SQLITE_OK);
+        const double x = t->placement.x0 + 3 * t->placement.dx, y = t->placement.y0 + 2 * t->placement.dy;
+        assert_int_equal(store_height(s, t, x, y, -1, &heights[step], &found, &error), SQLITE_OK);
+        assert_true(found);
+    }
+    assert_true(heights[1] == heights[0] + 1000);
+    assert_true(heights[2] == heights[0]);
+    store_close(s);
+    assert_int_equal(sqlite3_close(db), SQLITE_OK);
+}
+
 static void vacuum_and_close_succeed_after_queries(void **state) {
     (void)state;
     char path[128];
@@ -747,6 +773,7 @@ int main(void) {
         cmocka_unit_test(absurd_rows_crash_nothing),
         cmocka_unit_test(a_change_by_another_connection_is_seen_at_once),
         cmocka_unit_test(a_transaction_of_our_own_is_seen_and_its_rollback_too),
+        cmocka_unit_test(rows_that_we_change_and_roll_back_are_not_remembered),
         cmocka_unit_test(vacuum_and_close_succeed_after_queries),
         cmocka_unit_test(an_interrupt_stops_a_query_and_leaves_nothing_behind),
         cmocka_unit_test(a_commit_in_the_middle_of_a_query_is_not_mixed_in),

@@ -95,8 +95,10 @@ SELECT count(*) > 0 FROM rqt_check WHERE severity = 'error';
 UPDATE rqt_terrain SET dx = 0;
 SELECT * FROM rqt_range(NULL, 0);
 --! terrain spike
-SELECT * FROM rqt_terrains;
---! terrain spike
+SELECT name, width FROM rqt_terrains;
+--> spike|NULL
+SELECT message FROM rqt_check;
+--> terrain spike: its row in rqt_terrain has an impossible placement
 --# database spike
 UPDATE rqt_terrain SET format = 2;
 SELECT * FROM rqt_range(NULL, 0);
