@@ -147,6 +147,10 @@ prints "info shows an unfinished import" "INCOMPLETE" info unfinished.gpkg
 rqt check unfinished.gpkg
 [ $status = 1 ] && grep -q '^hill: error: terrain hill is incomplete' out
 ok "check of an unfinished import: status 1, and it says so" $? "status $status $(cat out err)"
+cp t.gpkg unusable.gpkg; sqlite3 unusable.gpkg "UPDATE rqt_terrain SET dx = 0 WHERE name = 'hill'"
+rqt info unusable.gpkg
+[ $status = 1 ] && grep -q 'hill: its row in rqt_terrain has an impossible placement' err && grep -q 'my.hole-2' out
+ok "info of a damaged row: status 1, and the other terrain is shown" $? "status $status $(cat out err)"
 refuses "verify of an unfinished import" 1 "hill" verify unfinished.gpkg --terrain hill --eps 1
 
 # ---------------------------------------------------------------------------------------------------------- verify

@@ -198,21 +198,32 @@ static int info(sqlite3 *db, const char *path, bool json) {
     if (code == SQLITE_OK) code = store_terrains(s, &terrains, &count, &sentence);
     if (s) store_close(s);
     if (code != SQLITE_OK) return cli_fail_store(code, sentence);
+    /* Rows that cannot be used are told on stderr and fail the command; the others are shown all the same. */
+    int usable = 0;
+    for (int i = 0; i < count; i++) {
+        if (terrains[i].problem) {
+            cli_say("%s", terrains[i].problem);
+            continue;
+        }
+        const store_terrain swap = terrains[usable];
+        terrains[usable++] = terrains[i];
+        terrains[i] = swap;
+    }
     figures *f = calloc((size_t)count + 1, sizeof *f);
     if (!f) status = cli_fail("out of memory");
-    for (int i = 0; i < count && status == CLI_OK; i++)
+    for (int i = 0; i < usable && status == CLI_OK; i++)
         if (!read_figures(db, terrains[i].name, &f[i])) status = CLI_FAILED;
     if (status == CLI_OK && json) {
-        status = print_json(terrains, f, count);
+        status = print_json(terrains, f, usable);
     } else if (status == CLI_OK) {
-        if (count)
-            print_table(terrains, f, count);
-        else
+        if (usable)
+            print_table(terrains, f, usable);
+        else if (count == 0)
             cli_say("%s has no terrain", path);
     }
     free(f);
     store_terrains_free(terrains, count);
-    return status;
+    return status == CLI_OK && usable < count ? CLI_FAILED : status;
 }
 
 static int run(int argc, char **argv) {
