@@ -42,7 +42,7 @@ for file in "${files[@]}"; do
     [[ -z ${seen[$name]:-} ]] || continue
     seen[$name]=1
     rm -f "$work/t.gpkg"
-    "$RQT" import --name t "$file" "$work/t.gpkg" 2>"$work/log.txt" || { cat "$work/log.txt" >&2; exit 1; }
+    "$RQT" import --name t "$file" "$work/t.gpkg" >"$work/log.txt" 2>&1 || { cat "$work/log.txt" >&2; exit 1; }
     list=$(IFS=,; echo "${EPS[*]}")
     mapfile -t lines < <(sqlite3 -bail -noheader -separator '|' "$work/t.gpkg" ".load ${RQT_SO%.so}" "
         SELECT width || ' x ' || height || ', ' || CASE WHEN cell_x < 0.1 THEN round(cell_x * 3600, 2) || '\"'
