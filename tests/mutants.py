@@ -97,9 +97,9 @@ MUTANTS = [
     ("verifier: looks at one size of triangle only", "src/verify/verify_overlap.c", "level < LEVELS", "level <= our_level",
      "test_verify", "triangles_of_very_different_size_are_compared"),
     # the store
-    ("store: what a rollback undid stays cached", "src/store/reader.c", "s->known = !writing;", "s->known = true;",
+    ("store: what a rollback undid stays cached", "src/store/store.c", "s->known = !writing;", "s->known = true;",
      "test_store_faults", "rows_that_we_change_and_roll_back_are_not_remembered"),
-    ("store: a query holds no state of the database", "src/store/reader.c", "if (s->holders++ > 0) return SQLITE_OK;",
+    ("store: a query holds no state of the database", "src/store/store.c", "if (s->holders++ > 0) return SQLITE_OK;",
      "if (s->holders++ >= 0) return SQLITE_OK;",
      "test_store_faults", "a_commit_in_the_middle_of_a_query_is_not_mixed_in"),
     ("store: an interval too long by one", "src/store/writer.c", "interval.em_parent - 1", "interval.em_parent",

@@ -1,23 +1,59 @@
-/* internal.h - what the files of the store share: sentences, and the rows of rqt_terrain. */
+/* internal.h - what the files of the store share: the connection's state, sentences, rows of rqt_terrain, blocks.
+ */
 #ifndef RQT_STORE_INTERNAL_H
 #define RQT_STORE_INTERNAL_H
 
+#include "cache.h"
 #include "store.h"
 
 #include <stdarg.h>
 
-/* Set *error to a sentence and return code (SQLITE_NOMEM when there is no memory for the sentence). */
+#define MOST_DATABASES 127 /* of a connection: main, temp, and SQLite's limit of 125 attached ones */
+
+typedef struct statements {
+    sqlite3_stmt *answers[2]; /* by rqt_outline */
+    sqlite3_stmt *bytes;
+} statements;
+
+struct store {
+    sqlite3 *db;
+    store_terrain *terrains;
+    statements *statements; /* one per terrain */
+    int count;
+    bool known;                         /* terrains are read, and the cache holds only what is theirs */
+    uint64_t version;                   /* of all databases, when they were read */
+    sqlite3_stmt *held[MOST_DATABASES]; /* statements that hold a database as it is */
+    sqlite3_stmt *probe;                /* asks whether we are interrupted */
+    int holders;                        /* calls of store_begin that have not ended */
+    block_cache *cache;
+    rqt_codec *codec;
+};
+
+/* Set *error to a sentence and return code (SQLITE_NOMEM when there is no memory for the sentence). terrain.c */
 int store_fail(char **error, int code, const char *format, ...);
 /* The same out of the connection's last error: "doing: what SQLite says". */
 int store_fail_db(char **error, sqlite3 *db, int code, const char *doing);
+/* A sentence for a status of the core. store.c */
+int store_fail_core(char **error, rqt_status status, const char *doing);
 
 /* All terrains of all databases of the connection. terrain.c */
 int store_read_terrains(sqlite3 *db, store_terrain **terrains, int *count, char **error);
 /* A new row with complete = 0. terrain.c */
 int store_insert_terrain(sqlite3 *db, const store_terrain *t, int64_t *id, char **error);
 
+/* store_begin, and the state is still the one in which store_find found the terrain. store.c */
+int store_begin_on(store *s, const store_terrain *t, char **error);
 sqlite3 *store_connection(const store *s);
-/* A sentence for a status of the core. */
-int store_fail_core(char **error, rqt_status status, const char *doing);
+/* The prepared statements of a terrain that store_find found. store.c */
+statements *store_statements(store *s, const store_terrain *t);
+/* Prepare sql (released here; NULL is out of memory) to be kept in *out. store.c */
+int store_prepare(store *s, const store_terrain *t, sqlite3_stmt **out, char *sql, char **error);
+
+/* The bytes of a block; valid until its statement is reset. blocks.c */
+int store_block_bytes(store *s, const store_terrain *t, rqt_block_number number, const uint8_t **bytes, int *size,
+                      char **error);
+/* The decoded block, from the cache or the database. *read: bytes read now, 0 when it was cached. blocks.c */
+int store_get_block(store *s, const store_terrain *t, rqt_block_number number, const rqt_block **block, int *read,
+                    char **error);
 
 #endif

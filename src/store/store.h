@@ -4,7 +4,7 @@
  * blocks, and never writes. Writing: a `store_writer` adds one terrain inside one transaction.
  *
  * The query side needs two things of an engine only: "the blocks of this terrain that meet this box and answer this
- * eps" (reader.c, answers) and "the bytes of block n" (reader.c, read_block). Nothing else here knows SQL.
+ * eps" (query.c, find_answers) and "the bytes of block n" (blocks.c). Nothing else here knows SQL.
  *
  * Results are SQLite's codes; damage to a terrain's own bytes is SQLITE_CORRUPT_VTAB, because plain SQLITE_CORRUPT
  * would make SQLite give up the host's transaction. With anything but SQLITE_OK, *error may hold a sentence, to be

@@ -1,0 +1,114 @@
+/* blocks.c - blocks by number: their bytes, decoded through the cache, and windows of full-resolution samples.
+ * Bytes are hostile: what does not decode, or does not fit its place in the terrain, is an error that names the
+ * block.
+ */
+#include "internal.h"
+
+int store_block_bytes(store *s, const store_terrain *t, rqt_block_number number, const uint8_t **bytes, int *size,
+                      char **error) {
+    sqlite3_stmt **kept = &store_statements(s, t)->bytes;
+    *bytes = NULL;
+    *size = 0;
+    if (!*kept) {
+        const int code = store_prepare(
+            s, t, kept, sqlite3_mprintf("SELECT data FROM \"%w\".rqt_block_%lld WHERE id = ?1", t->schema, t->id),
+            error);
+        if (code != SQLITE_OK) return code;
+    }
+    sqlite3_reset(*kept);
+    sqlite3_bind_int64(*kept, 1, (sqlite3_int64)number);
+    const int code = sqlite3_step(*kept);
+    if (code == SQLITE_ROW) {
+        *bytes = sqlite3_column_blob(*kept, 0);
+        *size = sqlite3_column_bytes(*kept, 0);
+        return *bytes || *size == 0 ? SQLITE_OK : SQLITE_NOMEM;
+    }
+    if (code != SQLITE_DONE) {
+        sqlite3_reset(*kept);
+        return store_fail_db(error, s->db, code, "reading a block");
+    }
+    sqlite3_reset(*kept);
+    return store_fail(error, SQLITE_CORRUPT_VTAB, "terrain %s is damaged: block %llu is missing", t->name, number);
+}
+
+int store_get_block(store *s, const store_terrain *t, rqt_block_number number, const rqt_block **block, int *read,
+                    char **error) {
+    const uint64_t key = (uint64_t)(t - s->terrains);
+    *read = 0;
+    *block = block_cache_find(s->cache, key, number);
+    if (*block) return SQLITE_OK;
+    const uint8_t *bytes;
+    int size;
+    int code = store_block_bytes(s, t, number, &bytes, &size, error);
+    if (code != SQLITE_OK) return code;
+    rqt_block_header header;
+    rqt_message why = {""};
+    rqt_block_place place;
+    rqt_block *fresh = NULL;
+    if (rqt_block_info(bytes, (size_t)size, &header, &why) != RQT_OK) {
+        code = store_fail(error, SQLITE_CORRUPT_VTAB, "terrain %s is damaged: block %llu: %s", t->name, number,
+                          why.text);
+    } else if (rqt_block_locate(&t->lattice, t->k, number, &place) != RQT_OK || header.k != t->k ||
+               header.width != place.width || header.height != place.height) {
+        code = store_fail(error, SQLITE_CORRUPT_VTAB, "terrain %s is damaged: block %llu does not fit its place",
+                          t->name, number);
+    } else {
+        fresh = block_cache_add(s->cache, key, number, t->k);
+        const rqt_status status = fresh ? rqt_block_decode(s->codec, bytes, (size_t)size, fresh) : RQT_NO_MEMORY;
+        if (status == RQT_NO_MEMORY)
+            code = SQLITE_NOMEM;
+        else if (status != RQT_OK)
+            code = store_fail(error, SQLITE_CORRUPT_VTAB,
+                              "terrain %s is damaged: block %llu: its bytes do not decode", t->name, number);
+        if (code != SQLITE_OK && fresh) block_cache_forget(s->cache, key, number);
+    }
+    sqlite3_reset(store_statements(s, t)->bytes);
+    if (code == SQLITE_OK) {
+        *block = fresh;
+        *read = size;
+    }
+    return code;
+}
+
+static int window(store *s, const store_terrain *t, int32_t col, int32_t row, int32_t width, int32_t height,
+                  int32_t *q, uint8_t *valid, char **error) {
+    if (col < 0 || row < 0 || width < 1 || height < 1 || col > t->lattice.width - width ||
+        row > t->lattice.height - height)
+        return store_fail(error, SQLITE_ERROR, "a window outside the raster");
+    const int shift = t->k, level = t->lattice.K - t->k;
+    const int32_t n = (1 << shift) + 1;
+    /* Blocks share borders: take each sample from the block it begins, the last column and row from the last one.
+     */
+    const int32_t last_i = t->lattice.width > 1 ? (t->lattice.width - 2) >> shift : 0;
+    const int32_t last_j = t->lattice.height > 1 ? (t->lattice.height - 2) >> shift : 0;
+    for (int32_t j = row >> shift; j <= last_j && j << shift < row + height; j++) {
+        for (int32_t i = col >> shift; i <= last_i && i << shift < col + width; i++) {
+            const rqt_block *block;
+            int read;
+            const int code = store_get_block(s, t, rqt_block_number_of(level, i, j), &block, &read, error);
+            if (code != SQLITE_OK) return code;
+            for (int32_t v = 0; v < n; v++) {
+                const int32_t y = (j << shift) + v;
+                if (y < row || y >= row + height || y >= t->lattice.height) continue;
+                for (int32_t u = 0; u < n; u++) {
+                    const int32_t x = (i << shift) + u;
+                    if (x < col || x >= col + width || x >= t->lattice.width) continue;
+                    const size_t to = (size_t)(y - row) * (size_t)width + (size_t)(x - col);
+                    const size_t from = (size_t)v * (size_t)n + (size_t)u;
+                    q[to] = block->q[from];
+                    valid[to] = block->flags[from] & RQT_VALID;
+                }
+            }
+        }
+    }
+    return SQLITE_OK;
+}
+
+int store_window(store *s, const store_terrain *t, int32_t col, int32_t row, int32_t width, int32_t height,
+                 int32_t *q, uint8_t *valid, char **error) {
+    int code = store_begin_on(s, t, error);
+    if (code != SQLITE_OK) return code;
+    code = window(s, t, col, row, width, height, q, valid, error);
+    store_end(s);
+    return code;
+}

@@ -1,0 +1,101 @@
+/* height.c - the height at one place: on the full-resolution half cell that holds it, or on the mesh of an eps.
+ */
+#include "internal.h"
+
+#include <math.h>
+#include <string.h>
+
+static double metres_of(const rqt_unit *unit, double q) {
+    return ((double)unit->z0 + q / (double)unit->d) * rqt_unit_factor(unit) + unit->offset;
+}
+
+/* The plane of the half cell that holds the place: what is valid and has weight counts. */
+static int full_height(store *s, const store_terrain *t, double col, double row, double *metres, bool *found,
+                       char **error) {
+    const int32_t w = t->lattice.width, h = t->lattice.height;
+    int32_t x = (int32_t)col, y = (int32_t)row;
+    if (x > w - 2) x = w > 1 ? w - 2 : 0;
+    if (y > h - 2) y = h > 1 ? h - 2 : 0;
+    const double fx = col - x, fy = row - y;
+    const rqt_block *block;
+    int read;
+    const int32_t i = x >> t->k, j = y >> t->k;
+    const int code = store_get_block(s, t, rqt_block_number_of(t->lattice.K - t->k, i, j), &block, &read, error);
+    if (code != SQLITE_OK) return code;
+    const size_t n = ((size_t)1 << t->k) + 1;
+    const size_t nw = (size_t)(y - (j << t->k)) * n + (size_t)(x - (i << t->k));
+    const size_t at[4] = {nw, nw + 1, nw + n, nw + n + 1}; /* NW NE SW SE */
+    double weight[4];
+    if ((x + y) % 2 == 0) { /* diagonal NW-SE */
+        weight[0] = 1 - (fx > fy ? fx : fy);
+        weight[1] = fx > fy ? fx - fy : 0;
+        weight[2] = fy > fx ? fy - fx : 0;
+        weight[3] = fx < fy ? fx : fy;
+    } else {
+        const double sum = fx + fy;
+        weight[0] = sum < 1 ? 1 - sum : 0;
+        weight[1] = sum < 1 ? fx : 1 - fy;
+        weight[2] = sum < 1 ? fy : 1 - fx;
+        weight[3] = sum > 1 ? sum - 1 : 0;
+    }
+    double q = 0;
+    for (int c = 0; c < 4; c++) {
+        if (weight[c] == 0) continue;
+        if (!(block->flags[at[c]] & RQT_VALID)) return SQLITE_OK;
+        q += weight[c] * block->q[at[c]];
+    }
+    *metres = metres_of(&t->unit, q);
+    *found = true;
+    return SQLITE_OK;
+}
+
+/* The plane of a triangle of the patch of the point. */
+static int mesh_height(store *s, const store_terrain *t, double x, double y, double col, double row, double eps,
+                       double *metres, bool *found, char **error) {
+    const uint32_t point = 1; /* also tells this machine's byte order, which the first byte of WKB names */
+    uint8_t wkb[21] = {*(const uint8_t *)&point};
+    memcpy(wkb + 1, &point, 4);
+    memcpy(wkb + 5, &x, 8);
+    memcpy(wkb + 13, &y, 8);
+    rqt_geometry *geometry = NULL;
+    rqt_region *region = NULL;
+    rqt_message why = {""};
+    rqt_status status = rqt_geometry_parse(wkb, sizeof wkb, false, store_allocator(), &geometry, &why);
+    if (status == RQT_OK)
+        status = rqt_region_create(geometry, &t->placement, &t->lattice, store_allocator(), &region);
+    int code = store_fail_core(error, status, "the point");
+    rqt_patch patch = {0};
+    const store_query_options options = {RQT_SELECT_THRESHOLD, RQT_OUTLINE_EXACT};
+    if (code == SQLITE_OK) code = store_query(s, t, region, eps, &options, &patch, NULL, error);
+    if (code == SQLITE_OK && patch.triangle_count > 0) {
+        const rqt_patch_vertex *a = &patch.vertices[patch.triangles[0]], *b = &patch.vertices[patch.triangles[1]],
+                               *c = &patch.vertices[patch.triangles[2]];
+        const double area =
+            (double)(b->col - a->col) * (c->row - a->row) - (double)(c->col - a->col) * (b->row - a->row);
+        const double wb = ((col - a->col) * (c->row - a->row) - (c->col - a->col) * (row - a->row)) / area;
+        const double wc = ((b->col - a->col) * (row - a->row) - (col - a->col) * (b->row - a->row)) / area;
+        *metres = metres_of(&t->unit, a->q + wb * ((double)b->q - a->q) + wc * ((double)c->q - a->q));
+        *found = true;
+    }
+    rqt_patch_free(&patch);
+    rqt_region_free(region);
+    rqt_geometry_free(geometry);
+    return code;
+}
+
+int store_height(store *s, const store_terrain *t, double x, double y, double eps, double *metres, bool *found,
+                 char **error) {
+    *metres = 0;
+    *found = false;
+    if (!isfinite(x) || !isfinite(y)) return store_fail(error, SQLITE_ERROR, "x and y must be finite numbers");
+    /* Regions round coordinates to 2^-20 sample; so do we, or a place on the border would fall off it by an ulp. */
+    const double col = nearbyint((x - t->placement.x0) / t->placement.dx * 0x1p20) * 0x1p-20;
+    const double row = nearbyint((y - t->placement.y0) / t->placement.dy * 0x1p20) * 0x1p-20;
+    if (!(col >= 0 && row >= 0 && col <= t->lattice.width - 1 && row <= t->lattice.height - 1)) return SQLITE_OK;
+    int code = store_begin_on(s, t, error);
+    if (code != SQLITE_OK) return code;
+    code = eps < 0 ? full_height(s, t, col, row, metres, found, error)
+                   : mesh_height(s, t, x, y, col, row, eps, metres, found, error);
+    store_end(s);
+    return code;
+}

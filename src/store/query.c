@@ -1,0 +1,218 @@
+/* query.c - region + eps -> patch: the index says which blocks answer, the core walks them.
+ *
+ * The R-tree holds, per block, its extent and the closed interval of error codes in which it answers. Nothing is
+ * taken on trust: every summary is checked, and areas are summed to prove that the answers tile the region's box.
+ */
+#include "internal.h"
+
+#include <string.h>
+
+static int answers_statement(store *s, const store_terrain *t, rqt_outline outline, sqlite3_stmt **out,
+                             char **error) {
+    sqlite3_stmt **kept = &store_statements(s, t)->answers[outline == RQT_OUTLINE_TOL];
+    int code = SQLITE_OK;
+    if (!*kept) {
+        const char *column = outline == RQT_OUTLINE_TOL ? "tol" : "exact";
+        code = store_prepare(
+            s, t, kept,
+            sqlite3_mprintf("SELECT b.id, b.summary FROM \"%w\".rqt_index_%lld i "
+                            "CROSS JOIN \"%w\".rqt_block_%lld b ON b.id = i.id WHERE i.x1 >= ?1 AND i.x0 <= ?2 "
+                            "AND i.y1 >= ?3 AND i.y0 <= ?4 AND i.%s0 <= ?5 AND i.%s1 >= ?5",
+                            t->schema, t->id, t->schema, t->id, column, column),
+            error);
+    }
+    *out = *kept;
+    return code;
+}
+
+typedef struct answer_list {
+    rqt_answer *rows;
+    size_t count, capacity;
+} answer_list;
+
+/* The answering blocks that meet the box; and a proof that the index is whole: their cells tile the box. */
+static int find_answers(store *s, const store_terrain *t, const int32_t box[4], rqt_outline outline, rqt_code eps,
+                        answer_list *list, char **error) {
+    sqlite3_stmt *row;
+    int code = answers_statement(s, t, outline, &row, error);
+    if (code != SQLITE_OK) return code;
+    for (int i = 0; i < 4; i++) sqlite3_bind_int(row, i + 1, box[i]);
+    sqlite3_bind_int(row, 5, eps);
+    int64_t covered = 0;
+    int32_t proof[4] = {box[0], box[1], box[2], box[3]};
+    for (int a = 0; a < 4; a += 2) {
+        const int32_t samples = a ? t->lattice.height : t->lattice.width;
+        if (proof[a] != proof[a + 1]) continue;
+        if (proof[a + 1] < samples - 1 || samples == 1)
+            proof[a + 1]++;
+        else
+            proof[a]--;
+    }
+    const int64_t wanted = (int64_t)(proof[1] - proof[0]) * (proof[3] - proof[2]);
+    while ((code = sqlite3_step(row)) == SQLITE_ROW) {
+        if (list->count == list->capacity) {
+            const size_t more = list->capacity ? 2 * list->capacity : 64;
+            rqt_answer *rows = sqlite3_realloc64(list->rows, more * sizeof *rows);
+            if (!rows) {
+                code = SQLITE_NOMEM;
+                break;
+            }
+            list->rows = rows;
+            list->capacity = more;
+        }
+        rqt_answer *answer = &list->rows[list->count];
+        answer->number = (rqt_block_number)sqlite3_column_int64(row, 0);
+        const void *bytes = sqlite3_column_blob(row, 1);
+        const int size = sqlite3_column_bytes(row, 1);
+        rqt_block_place p;
+        if (!bytes || rqt_summary_decode(bytes, (size_t)size, &answer->summary) != RQT_OK ||
+            !rqt_summary_answers(&answer->summary, outline, eps) ||
+            rqt_block_locate(&t->lattice, t->k, answer->number, &p) != RQT_OK) {
+            code = store_fail(error, SQLITE_CORRUPT_VTAB, "terrain %s is damaged: the summary of block %lld",
+                              t->name, (sqlite3_int64)answer->number);
+            break;
+        }
+        const int64_t x0 = p.x > proof[0] ? p.x : proof[0], x1 = p.x + p.side < proof[1] ? p.x + p.side : proof[1];
+        const int64_t y0 = p.y > proof[2] ? p.y : proof[2], y1 = p.y + p.side < proof[3] ? p.y + p.side : proof[3];
+        if (x1 > x0 && y1 > y0) covered += (x1 - x0) * (y1 - y0);
+        list->count++;
+        if (covered > wanted) break; /* blocks over one another */
+    }
+    sqlite3_reset(row);
+    if (code == SQLITE_DONE || (code == SQLITE_ROW && covered > wanted)) {
+        if (covered == wanted) return SQLITE_OK; /* and the query sees that they are disjoint */
+        return store_fail(error, SQLITE_CORRUPT_VTAB,
+                          "terrain %s is damaged: its index does not cover the region; see rqt_check", t->name);
+    }
+    if (!*error && code != SQLITE_NOMEM) code = store_fail_db(error, s->db, code, "reading the index");
+    return code;
+}
+
+typedef struct reading {
+    store *store;
+    const store_terrain *terrain;
+    const rqt_query *query;
+    store_reads *reads; /* may be NULL */
+    size_t next;
+    char **error;
+    int code;
+} reading;
+
+static int64_t count_selected(const rqt_query *query, const rqt_block *block) {
+    const size_t n = ((size_t)1 << block->k) + 1;
+    int64_t count = 0;
+    for (size_t i = 0; i < n * n; i++)
+        count += block->error[i] > query->eps ||
+                 (query->outline == RQT_OUTLINE_EXACT && (block->flags[i] & RQT_OUTLINE));
+    return count;
+}
+
+/* A row per answer, as answered from its index row; the query has sorted them. */
+static int begin_reads(const rqt_query *query, store_reads *reads) {
+    reads->rows = sqlite3_malloc64((query->answer_count + 1) * sizeof *reads->rows);
+    if (!reads->rows) return SQLITE_NOMEM;
+    reads->count = query->answer_count;
+    for (size_t i = 0; i < reads->count; i++) {
+        const rqt_summary *summary = &query->answers[i].summary;
+        int64_t selected = 0;
+        for (int c = 0; c < 4; c++)
+            selected += summary->corner[c].error > query->eps ||
+                        (query->outline == RQT_OUTLINE_EXACT && (summary->corner[c].flags & RQT_OUTLINE));
+        reads->rows[i] = (store_read){query->answers[i].number, false, false, 0, selected};
+    }
+    return SQLITE_OK;
+}
+
+static const rqt_block *read_block(void *context, rqt_block_number number) {
+    reading *r = context;
+    const rqt_block *block;
+    int read;
+    r->code = store_get_block(r->store, r->terrain, number, &block, &read, r->error);
+    if (r->code != SQLITE_OK) return NULL;
+    if (r->reads) {
+        /* Blocks come in the order of the answers, once, or twice when a selection is closed first. */
+        if (!r->reads->rows && (r->code = begin_reads(r->query, r->reads)) != SQLITE_OK) return NULL;
+        while (r->reads->rows[r->next].number != number) r->next = (r->next + 1) % r->reads->count;
+        store_read *row = &r->reads->rows[r->next];
+        if (!row->needs_bytes) {
+            const uint8_t *bytes;
+            int size = read;
+            if (!read) {
+                r->code = store_block_bytes(r->store, r->terrain, number, &bytes, &size, r->error);
+                sqlite3_reset(store_statements(r->store, r->terrain)->bytes);
+                if (r->code != SQLITE_OK) return NULL;
+            }
+            *row = (store_read){number, true, read == 0, size, count_selected(r->query, block)};
+        }
+    }
+    return block;
+}
+
+static bool is_interrupted(void *context) {
+    /* SQLite 3.40 tells nobody that sqlite3_interrupt was called but a statement that runs: so run one. */
+    reading *r = context;
+    store *s = r->store;
+    int code = SQLITE_OK;
+    if (!s->probe) code = sqlite3_prepare_v3(s->db, "SELECT 1", -1, SQLITE_PREPARE_PERSISTENT, &s->probe, NULL);
+    if (code == SQLITE_OK) code = sqlite3_step(s->probe);
+    sqlite3_reset(s->probe);
+    if (code == SQLITE_ROW) return false;
+    r->code = code & 0xFF;
+    return true;
+}
+
+void store_reads_free(store_reads *reads) {
+    sqlite3_free(reads->rows);
+    memset(reads, 0, sizeof *reads);
+}
+
+static int query(store *s, const store_terrain *t, const rqt_region *region, double eps,
+                 const store_query_options *options, rqt_patch *patch, store_reads *reads, char **error) {
+    memset(patch, 0, sizeof *patch);
+    if (reads) memset(reads, 0, sizeof *reads);
+    if (!(eps >= 0)) return store_fail(error, SQLITE_ERROR, "eps must be a number of metres, 0 or more");
+    int32_t box[4];
+    if (!rqt_region_box(region, &box[0], &box[2], &box[1], &box[3])) return SQLITE_OK;
+    const rqt_code code_eps = rqt_code_eps(eps, t->quantum_error);
+    answer_list list = {0};
+    char *sentence = NULL;
+    int code = find_answers(s, t, box, options->outline, code_eps, &list, &sentence);
+    if (code == SQLITE_OK) {
+        rqt_query query = {.lattice = t->lattice,
+                           .k = t->k,
+                           .region = region,
+                           .eps = code_eps,
+                           .select = options->select,
+                           .outline = options->outline,
+                           .answers = list.rows,
+                           .answer_count = list.count,
+                           .read_block = read_block,
+                           .is_interrupted = is_interrupted};
+        reading r = {
+            .store = s, .terrain = t, .query = &query, .reads = reads, .error = &sentence, .code = SQLITE_OK};
+        query.context = &r;
+        const rqt_status status = rqt_query_run(&query, store_allocator(), patch);
+        code = status == RQT_READ_FAILED || status == RQT_INTERRUPTED ? r.code
+                                                                      : store_fail_core(&sentence, status, "query");
+        if (code == SQLITE_OK && reads && !reads->rows) code = begin_reads(&query, reads);
+    }
+    sqlite3_free(list.rows);
+    if (code != SQLITE_OK && reads) store_reads_free(reads);
+    if (error && sentence) {
+        *error = sentence;
+        sentence = NULL;
+    }
+    sqlite3_free(sentence);
+    return code;
+}
+
+int store_query(store *s, const store_terrain *t, const rqt_region *region, double eps,
+                const store_query_options *options, rqt_patch *patch, store_reads *reads, char **error) {
+    memset(patch, 0, sizeof *patch);
+    if (reads) memset(reads, 0, sizeof *reads);
+    int code = store_begin_on(s, t, error);
+    if (code != SQLITE_OK) return code;
+    code = query(s, t, region, eps, options, patch, reads, error);
+    store_end(s);
+    return code;
+}
