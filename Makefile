@@ -34,9 +34,11 @@ CAIRO_CFLAGS = $(shell pkg-config --cflags cairo libpng 2>/dev/null)
 all: ## build the command and the extension: build/rqt and build/rqt.so
 	@./src/install-packages.sh build
 	@$(MAKE) --no-print-directory -j2 products
+	@echo "$(BUILD)/rqt and $(BUILD)/rqt.so are ready"
 
 .PHONY: products
 products: $(BUILD)/rqt $(BUILD)/rqt.so
+	@:
 
 $(BUILD)/librqt.a: $(CORE)
 	@rm -f $@
@@ -50,7 +52,7 @@ $(BUILD)/rqt: $(CLI) $(SQL_LINKED) $(IMPORT) $(PLAIN) $(GEO) $(BUILD)/librqt.a
 
 $(BUILD)/hosted/%.o: %.c $(GENERATED)
 	@mkdir -p $(@D)
-	@echo "  compile $<"; $(CC) $(CFLAGS) $(INCLUDES) -c $< -o $@
+	@echo "  compile $< (for rqt.so)"; $(CC) $(CFLAGS) $(INCLUDES) -c $< -o $@
 $(BUILD)/linked/%.o: %.c $(GENERATED)
 	@mkdir -p $(@D)
 	@echo "  compile $<"; $(CC) $(CFLAGS) $(INCLUDES) -DSQLITE_CORE -c $< -o $@
@@ -100,6 +102,7 @@ $(BUILD)/tests/test_%: $(BUILD)/tests/test_%.o $(BUILD)/tests/libtest.a
 
 .PHONY: test-programs test test-quick test-sanitize
 test-programs: $(TEST_PROGRAMS)
+	@:
 
 test: ## install, build, and pass every test (also under ASan and UBSan)
 	@./src/install-packages.sh build test
@@ -127,7 +130,7 @@ verify-data: ## rqt_verify over every DEM of DATA=dir at nine eps
 	@BUILD=$(BUILD) ./tests/bench/verify_data.sh $(DATA)
 
 .PHONY: check-layers
-check-layers: ## the rooms' one direction of dependency; what librqt.a and rqt.so may mention
+check-layers: ## modules depend one way only; librqt.a and rqt.so mention only what they may
 	@./src/install-packages.sh build test
 	@$(MAKE) --no-print-directory -j2 products
 	@BUILD=$(BUILD) ./tests/check_layers.sh

@@ -19,13 +19,13 @@ sql() { # one statement in the sqlite3 shell, with the extension loaded
     sqlite3 "$out/white-mountains.gpkg" -cmd ".load $build/rqt.so" -cmd '.mode column' "$1"
 }
 
-say 'A DEM into a database (a GeoPackage, because QGIS and OGR open it as it is)'
+say 'A DEM into a database (a GeoPackage)'
 run rqt import --name white_mountains examples/N44W072.hgt.zip "$out/white-mountains.gpkg"
 
 say 'The terrain'
 sql 'SELECT name, srid, width, height, min_z, max_z, voids, blocks, bytes FROM rqt_terrains;'
 
-say 'Vertices of one region, 5 km around the summit, for five tolerances; 13,354 samples lie under its mesh at 5 m'
+say 'Vertices of one region, 5 km around the summit, for five tolerances; 13 354 samples lie under its mesh at 5 m'
 circle='rqt_circle(-71.3033, 44.2705, 5000)'
 sql "SELECT e.value AS eps, count(*) AS vertices FROM json_each('[1,2,5,10,20]') e, rqt_range($circle, e.value) GROUP BY 1;"
 
@@ -40,7 +40,7 @@ sql "SELECT count(*) AS indices, (SELECT count(*) FROM rqt_triangles($circle, 20
 sql "SELECT seq, x, y, z FROM rqt_strip($circle, 20) LIMIT 4;"
 
 say 'Heights: the summit, full resolution and on the 20 m mesh'
-sql 'SELECT rqt_height(-71.3033, 44.2705) AS full, rqt_height(-71.3033, 44.2705, 20) AS mesh_20_m;'
+sql 'SELECT round(rqt_height(-71.3033, 44.2705), 2) AS full, round(rqt_height(-71.3033, 44.2705, 20), 2) AS mesh_20_m;'
 
 say 'Mesh files'
 box='-71.40,44.20,-71.20,44.34'

@@ -325,8 +325,11 @@ static void help_column(void *data, size_t row, int column, sqlite3_context *res
     case 4:
         text(result, f->purpose);
         break;
-    default:
+    case 5:
         text(result, f->example);
+        break;
+    default:
+        text(result, f->hidden ? f->hidden : "");
         break;
     }
 }

@@ -40,12 +40,12 @@ static int read_one(const cJSON *item, store_query_options *options, char **erro
     if (!c) return fail(error, "unknown option \"%s\"", item->string);
     if (c->pending[0] == '*') return fail(error, "option \"%s\" is not in this version", c->key);
     if (!cJSON_IsString(item))
-        return fail(error, "option \"%s\" must be a text: one of%s%s", c->key, c->done, c->pending);
+        return fail(error, "option \"%s\" must be a text: one of%.*s", c->key, (int)strlen(c->done) - 1, c->done);
     const char *value = item->valuestring;
     if (holds(c->pending, value)) return fail(error, "option \"%s\":\"%s\" is not in this version", c->key, value);
     if (!holds(c->done, value))
-        return fail(error, "option \"%s\" has no value \"%s\"; it knows%s%s", c->key, value, c->done,
-                    c->pending[0] ? c->pending + 1 : "");
+        return fail(error, "option \"%s\" has no value \"%s\"; this version knows%.*s", c->key, value,
+                    (int)strlen(c->done) - 1, c->done);
     if (strcmp(c->key, "select") == 0)
         options->select = strcmp(value, "topdown") == 0    ? RQT_SELECT_TOP_DOWN
                           : strcmp(value, "bottomup") == 0 ? RQT_SELECT_BOTTOM_UP

@@ -1,7 +1,7 @@
 #!/bin/sh
 # install-packages.sh PURPOSE... - installs the Debian packages that a purpose needs and this machine lacks, saying which.
 #
-# Purposes: build, test, format, lint. Does nothing, silently, when all is there. Needs root or sudo only when something
+# Purposes: build, test, format. Does nothing, silently, when all is there. Needs root or sudo only when something
 # is missing. On another system it says what to install by hand.
 set -eu
 
@@ -11,7 +11,6 @@ packages_for() {
         libcjson-dev libcairo2-dev libpng-dev fonts-dejavu-core ;;
     test) echo libcmocka-dev libgmp-dev libproj-dev gdal-bin libsqlite3-mod-spatialite python3 unzip binutils git ;;
     format) echo clang-format ;;
-    lint) echo clang-tidy cppcheck ;;
     *) echo "install-packages.sh: unknown purpose $1" >&2; exit 2 ;;
     esac
 }
@@ -32,12 +31,12 @@ for purpose in "$@"; do
 done
 [ -n "$missing" ] || exit 0
 
-echo "Installing what is missing:$missing" >&2
 run=
 if [ "$(id -u)" != 0 ]; then
     command -v sudo >/dev/null 2>&1 || { echo "Please install these packages as root:$missing" >&2; exit 1; }
     run=sudo
 fi
+echo "Installing what is missing:$missing" >&2
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
 export DEBIAN_FRONTEND=noninteractive

@@ -125,7 +125,7 @@ def main():
     # Objects are up to date with the sources they came from: times are kept.
     shutil.copytree(build, os.path.join(tree, "build"),
                     ignore=shutil.ignore_patterns("mutants", "sanitized", "bench", "demo", "*.log"))
-    environment = dict(os.environ, RQT_SEED="1")
+    environment = dict(os.environ, RQT_SEED="1", TMPDIR=os.path.abspath(tree))
     caught = missed = 0
     for what, path, old, new, program, test in MUTANTS:
         if only not in what:

@@ -1,56 +1,49 @@
 #!/bin/bash
-# run.sh [quick] - runs every test program and script, and ends with `N passed, N failed`.
+# run.sh [quick] - runs every test program and script, two at a time, and ends with `N passed, N failed`.
 #
-# A cmocka program says `[  PASSED  ] n` and `[  FAILED  ] n`, a script `N passed, N failed`; both are counted. A program that
-# ends badly without naming a failed test counts as one failure. Output goes to build/tests/*.log; that of a failed
-# one is shown. Without `quick`, the programs run a second time as built with ASan and UBSan.
+# A cmocka program says `[  PASSED  ] n` and `[  FAILED  ] n`, a script `N passed, N failed`; both are counted. One that
+# ends badly without naming a failed test, or runs none, counts as one failure. Output goes to build/tests/*.log; of what
+# failed the telling lines are shown. Without `quick`, the programs run a second time as built with ASan and UBSan.
 set -u
 BUILD=${BUILD:-build}
 mode=${1:-full}
-passed=0 failed=0
-logs=$BUILD/tests
+export logs=$BUILD/tests
 mkdir -p "$logs"
+rm -f "$logs"/*.log "$logs"/*.sum
 
-count() { # log status name
-    local p f
-    p=$(sed -n 's/^\[  PASSED  \] \([0-9]*\) test.*/\1/p; s/^\([0-9]*\) passed, [0-9]* failed.*/\1/p' "$1" | awk '{s+=$1} END {print s+0}')
-    f=$(sed -n 's/^\[  FAILED  \] \([0-9]*\) test.*/\1/p; s/^[0-9]* passed, \([0-9]*\) failed.*/\1/p' "$1" | awk '{s+=$1} END {print s+0}')
-    if [ "$2" != 0 ] && [ "$f" = 0 ]; then f=1; fi
-    if [ "$2" = 0 ] && [ "$p" = 0 ]; then echo "  $3 ran no test"; f=1; fi
-    passed=$((passed + p)) failed=$((failed + f))
-    if [ "$f" != 0 ]; then
-        echo "FAILED $3: $f failed"
-        grep -E -A4 "FAILED|ERROR|Error|Traceback" "$1" | head -n 40; tail -n 15 "$1"
-    else
-        printf '  %-44s %4d passed  %3d s\n' "$3" "$p" "$4"
-    fi
-}
-
-run() { # name command...
-    local name=$1 log start status
+run_one() { # name command...: a line for people, and passed, failed, name for the sum
+    local name=$1 log status p f start=$SECONDS
     shift
-    log=$logs/$(echo "$name" | tr ' /' '__').log
-    start=$SECONDS
+    log=$logs/${name// /_}.log
     "$@" >"$log" 2>&1 </dev/null
     status=$?
-    count "$log" "$status" "$name" $((SECONDS - start))
+    p=$(sed -n 's/^\[  PASSED  \] \([0-9]*\) test.*/\1/p; s/^\([0-9]*\) passed, [0-9]* failed$/\1/p' "$log" | awk '{s+=$1} END {print s+0}')
+    f=$(sed -n 's/^\[  FAILED  \] \([0-9]*\) test.*/\1/p; s/^[0-9]* passed, \([0-9]*\) failed$/\1/p' "$log" | awk '{s+=$1} END {print s+0}')
+    if [ "$f" = 0 ] && { [ $status != 0 ] || [ "$p" = 0 ]; }; then f=1; fi
+    echo "$p $f $name" >"$logs/${name// /_}.sum"
+    if [ "$f" = 0 ]; then
+        printf '  %-44s %4d passed  %3d s\n' "$name" "$p" $((SECONDS - start))
+    else
+        printf '  %-44s %4d passed, %d FAILED, status %d, see %s\n' "$name" "$p" "$f" $status "$log"
+        grep -E -A4 'FAILED|ERROR|Error|Traceback' "$log" | grep -vE '^[0-9]+ passed, ' | head -n 40 | sed 's/^/      /'
+    fi
 }
+export -f run_one
 
-for source in tests/test_*.c; do
-    name=$(basename "$source" .c)
-    run "$name" "$BUILD/tests/$name"
-done
 export RQT=$PWD/$BUILD/rqt RQT_SO=$PWD/$BUILD/rqt.so
-for script in tests/test_*.sh; do
-    [ -e "$script" ] && run "$(basename "$script")" bash "$script"
-done
-if [ "$mode" = full ]; then
-    export ASAN_OPTIONS=detect_leaks=1:allocator_may_return_null=1
+export ASAN_OPTIONS=detect_leaks=1:allocator_may_return_null=1
+{
+    # The longest first, so that none is left over at the end.
+    for script in tests/test_*.sh; do printf '%s\0' "$(basename "$script")|bash|$script"; done
+    if [ "$mode" = full ]; then
+        for source in tests/test_core_*.c tests/test_*.c; do
+            name=$(basename "$source" .c)
+            printf '%s\0' "$name sanitized|$BUILD/sanitized/tests/$name"
+        done | awk 'BEGIN { RS = ORS = "\0" } !seen[$0]++'
+    fi
     for source in tests/test_*.c; do
         name=$(basename "$source" .c)
-        # Exhaustive arithmetic gains nothing from a sanitizer that a tenth of it does not show.
-        RQT_QUICK=1 run "$name sanitized" "$BUILD/sanitized/tests/$name"
+        printf '%s\0' "$name|$BUILD/tests/$name"
     done
-fi
-echo "$passed passed, $failed failed"
-[ "$failed" = 0 ]
+} | xargs -0 -P 2 -n 1 bash -c 'IFS="|" read -r -a command <<<"$0"; run_one "${command[@]}"'
+awk '$2 > 0 { printf "FAILED %s\n", $3 } { passed += $1; failed += $2 } END { printf "%d passed, %d failed\n", passed, failed; exit failed > 0 }' "$logs"/*.sum

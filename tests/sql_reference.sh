@@ -11,11 +11,15 @@ metres, 0 or more; 0 is lossless, 9e999 the coarsest. **terrain**: a name; NULL 
 object; this version knows `mode` cover, `outline` exact, `metric` exact, `select` threshold, topdown or bottomup (the same
 mesh three ways), `strip` bintree.
 
+Options come after the terrain, which may be NULL: `rqt_range('SRID=4326;POINT(-71.3 44.27)', 10, NULL, '{"select":"bottomup"}')`.
+
+Columns called *hidden* do not show in `SELECT *`, but can be selected by name.
+
 A query answers with every triangle of the terrain's mesh at eps whose interior meets the interior of the region; for lines
 and points, every triangle that they touch. Triangles of any two answers at one eps are equal or disjoint.
 HEAD
 sqlite3 :memory: -cmd ".load $1/rqt.so" "
 SELECT char(10) || '## ' || name || '(' || arguments || ')' || char(10) || char(10) ||
-       CASE kind WHEN 'table' THEN 'Columns: ' ELSE 'Gives: ' END || returns || '. ' || purpose || char(10) || char(10) ||
+       CASE kind WHEN 'table' THEN 'Columns: ' ELSE 'Gives: ' END || returns || '. ' || purpose || CASE WHEN hidden <> '' THEN ' Hidden: ' || hidden || '.' ELSE '' END || char(10) || char(10) ||
        '    ' || example || ';'
 FROM rqt_help"
