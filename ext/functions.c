@@ -38,7 +38,7 @@ const function rqt_functions[] = {
      .arguments = "",
      .returns = "name, srid, width, height, cell_x, cell_y, min_z, max_z, quantum, voids, blocks, bytes, max_error",
      .purpose = "The terrains of this connection's databases. Heights, quantum and max_error in metres, cells in "
-                "CRS units. ",
+                "CRS units.",
      .example = "SELECT name, width, height, min_z, max_z FROM rqt_terrains",
      .fill = fill_terrains,
      .hidden = "schema, complete, x0, y0, dx, dy, k, quantum_error, crs, vertical, source, created",

@@ -313,8 +313,8 @@ void rqt_pyramid_block(const rqt_pyramid *pyramid, size_t n, rqt_block_number *n
 typedef struct rqt_geometry rqt_geometry;
 typedef struct rqt_region rqt_region;
 
-/* text: n characters of WKT or EWKT; else n bytes of a GeoPackage or SpatiaLite geometry. Z and M are read and
- * ignored. RQT_INVALID with a sentence for anything unreadable, not finite, or empty where it must not be;
+/* text: n characters of WKT or EWKT; else n bytes of a GeoPackage or SpatiaLite geometry, WKB or EWKB. Z and M are
+ * read and ignored. RQT_INVALID with a sentence for anything unreadable, not finite, or empty where it must not be;
  * RQT_UNSUPPORTED for curves and surfaces. An EMPTY geometry is valid and meets nothing. */
 rqt_status rqt_geometry_parse(const void *bytes, size_t n, bool text, const rqt_allocator *allocator,
                               rqt_geometry **geometry, rqt_message *message);
