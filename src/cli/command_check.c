@@ -17,7 +17,7 @@ static const char HELP[] =
     "  --help          this text\n"
     "\n"
     "Examples:\n"
-    "  rqt check alps.gpkg\n"
+    "  rqt check washington.gpkg\n"
     "  rqt check --terrain washington mountains.gpkg && cp mountains.gpkg /backup/\n";
 
 static const struct option OPTIONS[] = {

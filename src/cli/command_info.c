@@ -24,8 +24,8 @@ static const char HELP[] =
     "  --help          this text\n"
     "\n"
     "Examples:\n"
-    "  rqt info alps.gpkg\n"
-    "  rqt info --json alps.gpkg | jq '.[].name'\n";
+    "  rqt info washington.gpkg\n"
+    "  rqt info --json washington.gpkg | jq '.[].name'\n";
 
 static const struct option OPTIONS[] = {
     {"json", no_argument, NULL, 'j'}, {"help", no_argument, NULL, 'h'}, {NULL, 0, NULL, 0}};
@@ -78,8 +78,12 @@ static void add_row(cli_table *table, const store_terrain *t, const figures *f) 
     double across, down;
     cli_ground(t, 0, t->lattice.height, &across, &down);
     snprintf(samples, sizeof samples, "%d x %d", t->lattice.width, t->lattice.height);
-    snprintf(cell, sizeof cell, "%.3g x %.3g m", across, down);
-    if (!*t->crs) snprintf(cell, sizeof cell, "%.3g x %.3g", fabs(t->placement.dx), fabs(t->placement.dy));
+    if (!*t->crs)
+        snprintf(cell, sizeof cell, "%s x %s", cli_real(fabs(t->placement.dx)), cli_real(fabs(t->placement.dy)));
+    else if (fmax(across, down) < 999.5)
+        snprintf(cell, sizeof cell, "%.3g x %.3g m", across, down);
+    else
+        snprintf(cell, sizeof cell, "%s x %s", cli_length(across), cli_length(down));
     snprintf(heights, sizeof heights, "%s .. %s m", cli_real(f->min_z), cli_real(f->max_z));
     snprintf(bits, sizeof bits, "%.2f", 8.0 * (double)f->bytes / samples_of(t));
     snprintf(percent, sizeof percent, "%.3g %%", 100.0 * (double)f->voids / samples_of(t));
@@ -186,6 +190,10 @@ static void print_table(const store_terrain *terrains, const figures *f, int cou
     cli_table_add(&table, heads);
     for (int i = 0; i < count; i++) add_row(&table, &terrains[i], &f[i]);
     cli_table_print(&table);
+    bool outline = false;
+    for (int i = 0; i < count; i++)
+        outline = outline || (f[i].voids && f[i].has_heights && f[i].max_error > f[i].max_z - f[i].min_z);
+    if (outline) puts("max error counts what a void outline may cost");
     for (int i = 0; i < count; i++) print_details(&terrains[i]);
 }
 

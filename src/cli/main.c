@@ -63,16 +63,17 @@ static int help_of_all(void) {
          "\n"
          "Commands:");
     for (int i = 0; i < COMMAND_COUNT; i++) printf("  %-8s %s\n", COMMANDS[i]->name, COMMANDS[i]->summary);
-    puts("\n"
-         "rqt COMMAND --help tells its options. rqt --version tells the version.\n"
-         "\n"
-         "Examples:\n"
-         "  rqt import N44W072.hgt.zip alps.gpkg                  a raster becomes a terrain of a database\n"
-         "  rqt info alps.gpkg                                    what is in the database\n"
-         "  rqt mesh alps.gpkg --eps 5,20,80 -o washington.png    its mesh at three tolerances, as a picture\n"
-         "\n"
-         "Exit status: 0 done, 1 failed or a check that did not hold, 2 bad usage.\n"
-         "Data goes to stdout, messages to stderr.");
+    puts(
+        "\n"
+        "rqt COMMAND --help tells its options. rqt --version tells the version.\n"
+        "\n"
+        "Examples:\n"
+        "  rqt import N44W072.hgt.zip washington.gpkg                  a raster becomes a terrain of a database\n"
+        "  rqt info washington.gpkg                                    what is in the database\n"
+        "  rqt mesh washington.gpkg --eps 5,20,80 -o washington.png    its mesh at three tolerances, as a picture\n"
+        "\n"
+        "Exit status: 0 done, 1 failed or a check that did not hold, 2 bad usage.\n"
+        "Data goes to stdout, messages to stderr.");
     return CLI_OK;
 }
 

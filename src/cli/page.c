@@ -15,7 +15,8 @@
 #define GAP 30
 #define HEADER 104       /* title and what belongs to it, above the panels */
 #define CAPTION 106      /* below each panel */
-#define MOST_LINES 60000 /* edges in a panel of an SVG that are drawn as lines */
+#define MOST_LINES 60000 /* edges of an SVG that are drawn as lines, some 42 bytes each */
+#define MOST_PIXELS 3e6  /* of the images in an SVG: viewers refuse 10 MB, and a pixel takes up to 2 bytes */
 #define ONE_HEIGHT 0.8   /* a panel is not higher than this share of the page's width */
 
 static const double INK[3] = {0.114, 0.149, 0.192}, SOFT[3] = {0.341, 0.392, 0.451};
@@ -26,7 +27,15 @@ static int columns_of(int count) {
     return count <= 4 ? count : count <= 6 ? 3 : 4;
 }
 
-void picture_layout(picture_page *page, double width, double density) {
+/* In an SVG the panels with the fewest edges have lines, as long as there are not too many in all. */
+static bool has_lines(const picture_page *page, const picture_mesh *mesh) {
+    size_t sum = 0;
+    for (int i = 0; i < page->count; i++)
+        if (page->meshes[i].count <= mesh->count) sum += page->meshes[i].count;
+    return sum <= MOST_LINES;
+}
+
+void picture_layout(picture_page *page, double width, bool lines) {
     picture_window *w = &page->window;
     const double unit = width / PAGE, ground = picture_span(w->cols) * w->across;
     /* Of a strip of land a thumb's width is shown, however long it is. */
@@ -40,9 +49,12 @@ void picture_layout(picture_page *page, double width, double density) {
     }
     w->panel_width = fmax(floor(panel_width), 1);
     w->panel_height = fmax(floor(panel_height), 1);
-    w->density = density;
-    w->pixel_width = (int)lround(w->panel_width * density);
-    w->pixel_height = (int)lround(w->panel_height * density);
+    int images = 1;
+    for (int i = 0; i < page->count; i++) images += !has_lines(page, &page->meshes[i]);
+    const double pixels = images * w->panel_width * w->panel_height;
+    w->density = lines && pixels > MOST_PIXELS ? sqrt(MOST_PIXELS / pixels) : 1;
+    w->pixel_width = (int)fmax(round(w->panel_width * w->density), 1);
+    w->pixel_height = (int)fmax(round(w->panel_height * w->density), 1);
     page->width = width;
     page->height = ceil((MARGIN + HEADER + MARGIN / 2.0) * unit + rows * (w->panel_height + CAPTION * unit));
 }
@@ -88,15 +100,52 @@ static const char *degrees(double value, bool is_x, char text[48]) {
     return text;
 }
 
+/* The next place of a WKT that SQL has accepted, its first two numbers, and whether its list ends there (a ring, a
+ * line, a place alone). NULL: there is none. */
+static const char *next_place(const char *at, double xy[2], bool *last) {
+    int number = 0;
+    for (; *at; at++) {
+        char *end;
+        const double value = strtod(at, &end);
+        if (end != at && !strchr("iInN", *at)) {
+            if (number < 2) xy[number] = value;
+            number++;
+            at = end - 1;
+        } else if (strchr("(),", *at)) {
+            *last = *at != ',';
+            if (number >= 2) return at;
+            number = 0;
+        }
+    }
+    return NULL;
+}
+
+/* Least and largest x, least and largest y of a region as it was given. */
+static bool region_extent(const char *region, double box[4]) {
+    const char *at = region ? strchr(region, '(') : NULL;
+    double xy[2];
+    bool last, any = false;
+    for (; at && (at = next_place(at, xy, &last)); any = true)
+        for (int i = 0; i < 2; i++) {
+            box[2 * i] = any ? fmin(box[2 * i], xy[i]) : xy[i];
+            box[2 * i + 1] = any ? fmax(box[2 * i + 1], xy[i]) : xy[i];
+        }
+    return any;
+}
+
+/* Of the region when there is one, else of the window. */
 static void extent_text(const picture_page *page, char *text, size_t size) {
     const picture_window *w = &page->window;
     const store_terrain *t = page->terrain;
     const rqt_placement *p = &t->placement;
-    const double x0 = p->x0 + w->col * p->dx, x1 = p->x0 + (w->col + w->cols - 1) * p->dx;
-    const double y0 = p->y0 + w->row * p->dy, y1 = p->y0 + (w->row + w->rows - 1) * p->dy;
-    const double width = (w->cols - 1) * w->across, height = (w->rows - 1) * w->down;
+    double x0 = p->x0 + w->col * p->dx, x1 = p->x0 + (w->col + w->cols - 1) * p->dx;
+    double y0 = p->y0 + w->row * p->dy, y1 = p->y0 + (w->row + w->rows - 1) * p->dy;
+    double box[4];
+    if (region_extent(page->region, box)) x0 = box[0], x1 = box[1], y0 = box[3], y1 = box[2];
+    const double width = fabs((x1 - x0) / p->dx) * w->across, height = fabs((y1 - y0) / p->dy) * w->down;
     char a[48], b[48], c[48], d[48], ground[120] = "";
-    if (*t->crs) snprintf(ground, sizeof ground, "   ·   %s × %s", cli_length(width), cli_length(height));
+    if (*t->crs && (width > 0 || height > 0))
+        snprintf(ground, sizeof ground, "   ·   %s × %s", cli_length(width), cli_length(height));
     if (t->lonlat)
         snprintf(text, size, "%s – %s,  %s – %s%s", degrees(x0, true, a), degrees(x1, true, b),
                  degrees(y1, false, c), degrees(y0, false, d), ground);
@@ -151,8 +200,8 @@ static void draw_header(const picture_page *page, cairo_t *cr, double unit) {
     write_text(cr, left, (MARGIN + 57) * unit, 0, room, 17 * unit, false, extent);
     const bool part = page->window.cols < t->lattice.width || page->window.rows < t->lattice.height;
     if (part)
-        snprintf(text, sizeof text, "%d × %d of %d × %d samples", page->window.cols, page->window.rows,
-                 t->lattice.width, t->lattice.height);
+        snprintf(text, sizeof text, "%s%d × %d of %d × %d samples", page->region ? "shown: " : "",
+                 page->window.cols, page->window.rows, t->lattice.width, t->lattice.height);
     else
         snprintf(text, sizeof text, "%d × %d samples", t->lattice.width, t->lattice.height);
     if (*t->crs) {
@@ -182,7 +231,8 @@ static void paint_image(cairo_t *cr, cairo_surface_t *image, const picture_windo
     cairo_save(cr);
     cairo_scale(cr, w->panel_width / w->pixel_width, w->panel_height / w->pixel_height);
     cairo_set_source_surface(cr, image, 0, 0);
-    if (w->density == 1) cairo_pattern_set_filter(cairo_get_source(cr), CAIRO_FILTER_NEAREST);
+    if (cairo_surface_get_type(cairo_get_target(cr)) == CAIRO_SURFACE_TYPE_IMAGE)
+        cairo_pattern_set_filter(cairo_get_source(cr), CAIRO_FILTER_NEAREST);
     cairo_paint(cr);
     cairo_restore(cr);
 }
@@ -201,7 +251,7 @@ static void paint_cover(cairo_t *cr, const picture_mesh *mesh, const picture_win
 }
 
 static void draw_edges(const picture_page *page, cairo_t *cr, const picture_mesh *mesh, bool lines) {
-    if (!lines || mesh->count > MOST_LINES) {
+    if (!lines || !has_lines(page, mesh)) {
         paint_cover(cr, mesh, &page->window);
         return;
     }
@@ -212,41 +262,26 @@ static void draw_edges(const picture_page *page, cairo_t *cr, const picture_mesh
     cairo_stroke(cr);
 }
 
-/* The rings and lines of a WKT that SQL has accepted: every innermost list of numbers, the first two of each place.
- * A place alone becomes a ring of its own (a circle on the page). */
+/* The rings and lines of a region. A place alone becomes a ring of its own (a circle on the page). */
 static void trace_region(const picture_page *page, cairo_t *cr, double unit) {
     const picture_window *w = &page->window;
     const rqt_placement *p = &page->terrain->placement;
     const double sx = w->panel_width / picture_span(w->cols), sy = w->panel_height / picture_span(w->rows);
     const char *at = strchr(page->region, '(');
-    int places = 0, number = 0;
-    double xy[2] = {0, 0}, x = 0, y = 0;
-    while (at && *at) {
-        char *end;
-        const double value = strtod(at, &end);
-        if (end != at && !strchr("iInN", *at)) {
-            if (number < 2) xy[number] = value;
-            number++;
-            at = end;
-            continue;
+    int places = 0;
+    double xy[2];
+    bool last;
+    while (at && (at = next_place(at, xy, &last))) {
+        const double x = ((xy[0] - p->x0) / p->dx - w->col) * sx, y = ((xy[1] - p->y0) / p->dy - w->row) * sy;
+        if (places++)
+            cairo_line_to(cr, x, y);
+        else
+            cairo_move_to(cr, x, y);
+        if (last && places == 1) {
+            cairo_new_sub_path(cr);
+            cairo_arc(cr, x, y, 7 * unit, 0, 2 * M_PI);
         }
-        if (strchr("(),", *at)) {
-            if (number >= 2) {
-                x = ((xy[0] - p->x0) / p->dx - w->col) * sx;
-                y = ((xy[1] - p->y0) / p->dy - w->row) * sy;
-                if (places++)
-                    cairo_line_to(cr, x, y);
-                else
-                    cairo_move_to(cr, x, y);
-            }
-            if (*at != ',' && places == 1) {
-                cairo_new_sub_path(cr);
-                cairo_arc(cr, x, y, 7 * unit, 0, 2 * M_PI);
-            }
-            if (*at != ',') places = 0;
-            number = 0;
-        }
-        at++;
+        if (last) places = 0;
     }
 }
 

@@ -1,6 +1,6 @@
 /* picture.c - a picture of a terrain and its meshes: gathers what is shown and writes the file.
  *
- * The window is the region's box and a margin, so that its outline and the triangles that reach over it are seen;
+ * The window is the region's box and a margin, so that its outline and the triangles that reach over it are seen,
  * the whole raster without a region. Numbers in the captions are the verifier's, not the mesh's own.
  */
 #include "picture.h"
@@ -10,10 +10,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define AROUND 0.07     /* margin of a region, of its longer side */
-#define LEAST_MARGIN 3  /* samples */
-#define SMALL 8         /* a box of fewer samples a side is shown with the triangles around it */
-#define SVG_DENSITY 2.0 /* pixels of embedded images per unit */
+#define AROUND 0.07      /* margin of a region, of its longer side */
+#define MOST_AROUND 0.25 /* of each side: as far as the coarsest mesh is followed over the rim */
+#define LEAST_MARGIN 3   /* samples */
+#define SMALL 8          /* a box of fewer samples a side is shown with the triangles around it */
 
 /* The box of the region in samples. False after a sentence, also when it misses the raster. */
 static bool region_box(const store_terrain *t, const char *wkt, int32_t box[4]) {
@@ -38,6 +38,23 @@ static int32_t clamp(double value, int32_t low, int32_t high) {
     return value < low ? low : value > high ? high : (int32_t)value;
 }
 
+/* Room for the outline, and for the coarsest mesh's triangles that reach over it. */
+static void add_margin(const picture_page *page, int32_t box[4]) {
+    const rqt_lattice *lattice = &page->terrain->lattice;
+    const int32_t width = box[1] - box[0], height = box[3] - box[2];
+    const double margin = fmax(ceil((width > height ? width : height) * AROUND), LEAST_MARGIN);
+    const picture_mesh *coarsest = &page->meshes[0];
+    for (int i = 1; i < page->count; i++)
+        if (page->meshes[i].eps > coarsest->eps) coarsest = &page->meshes[i];
+    for (int i = 0; i < 4; i++) {
+        const double most = floor((i < 2 ? width : height) * MOST_AROUND);
+        const int32_t over = !coarsest->count ? 0 : i % 2 ? coarsest->box[i] - box[i] : box[i] - coarsest->box[i];
+        const double around = fmax(margin, fmin(over + 1, most));
+        box[i] =
+            clamp(i % 2 ? box[i] + around : box[i] - around, 0, (i < 2 ? lattice->width : lattice->height) - 1);
+    }
+}
+
 static bool choose_window(picture_page *page) {
     const store_terrain *t = page->terrain;
     int32_t box[4];
@@ -51,12 +68,7 @@ static bool choose_window(picture_page *page) {
             for (int i = 0; i < 4; i++)
                 box[i] = i % 2 ? (box[i] > finest->box[i] ? box[i] : finest->box[i])
                                : (box[i] < finest->box[i] ? box[i] : finest->box[i]);
-        const int32_t longer = box[1] - box[0] > box[3] - box[2] ? box[1] - box[0] : box[3] - box[2];
-        const double margin = fmax(ceil(longer * AROUND), LEAST_MARGIN);
-        box[0] = clamp(box[0] - margin, 0, t->lattice.width - 1);
-        box[1] = clamp(box[1] + margin, 0, t->lattice.width - 1);
-        box[2] = clamp(box[2] - margin, 0, t->lattice.height - 1);
-        box[3] = clamp(box[3] + margin, 0, t->lattice.height - 1);
+        add_margin(page, box);
     }
     picture_window *w = &page->window;
     *w = (picture_window){.col = box[0], .row = box[2], .cols = box[1] - box[0] + 1, .rows = box[3] - box[2] + 1};
@@ -65,13 +77,13 @@ static bool choose_window(picture_page *page) {
 }
 
 static bool gather(sqlite3 *db, store *s, picture_page *page, const double *eps, const char *terrain,
-                   const char *options, double width, double density) {
+                   const char *options, double width, bool svg) {
     for (int i = 0; i < page->count; i++)
         if (!picture_mesh_read(db, page->region, eps[i], terrain, options, &page->meshes[i])) return false;
     if (!choose_window(page)) return false;
-    picture_layout(page, width, density);
+    picture_layout(page, width, svg);
     if (!picture_relief_make(s, page->terrain, &page->window, &page->relief)) return false;
-    const double line = picture_line_width(page) * density;
+    const double line = picture_line_width(page) * page->window.density;
     for (int i = 0; i < page->count; i++)
         if (!picture_mesh_cover(&page->meshes[i], &page->window, line)) return false;
     return true;
@@ -103,7 +115,7 @@ int cli_write_picture(sqlite3 *db, const char *region, const double *eps, int co
     page.meshes = calloc((size_t)count, sizeof *page.meshes);
     if (!page.meshes)
         cli_fail("out of memory");
-    else if (gather(db, s, &page, eps, terrain, options, width, svg ? SVG_DENSITY : 1))
+    else if (gather(db, s, &page, eps, terrain, options, width, svg))
         status = write_file(&page, svg, output);
     for (int i = 0; page.meshes && i < count; i++) {
         free(page.meshes[i].edges);

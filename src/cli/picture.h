@@ -70,9 +70,10 @@ typedef struct picture_page {
     double width, height; /* of the page */
 } picture_page;
 
-/* Page size and panel size for a page width: window.col .. down are set before. */
-void picture_layout(picture_page *page, double width, double density);
-/* lines: draw edges as lines where there are few enough, not as an image (for SVG). */
+/* Page size, panel size and density for a page width: window.col .. down and the meshes' edges are set before.
+ * Images have the page's own pixels; in an SVG (lines) fewer when they would be too much for viewers. */
+void picture_layout(picture_page *page, double width, bool lines);
+/* lines: draw edges as lines where there are few enough, not as an image (for SVG), as in picture_layout. */
 void picture_draw(const picture_page *page, cairo_t *cr, bool lines);
 double picture_line_width(const picture_page *page); /* of an edge, in panel units */
 

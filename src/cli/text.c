@@ -58,7 +58,7 @@ const char *cli_place(double value, bool lonlat) {
 const char *cli_length(double metres) {
     char *text = next_text();
     const double km = metres / 1000;
-    if (metres < 1000)
+    if (metres < 999.5)
         snprintf(text, 64, "%.3g m", metres);
     else
         snprintf(text, 64, km < 10 ? "%.2f km" : km < 100 ? "%.1f km" : "%.0f km", km);

@@ -17,7 +17,6 @@
 #include <unistd.h>
 
 #define BUSY_MILLISECONDS 3000
-#define CACHE_KIBIBYTES 32768
 
 bool import_database_refuse(const import_job *job, int code, char *detail) {
     const char *path = job->database, *more = detail && *detail ? detail : sqlite3_errstr(code);
@@ -138,7 +137,8 @@ bool import_database_begin(const import_job *job, int k, import_database *d) {
     *d = (import_database){.created = !there};
     if (!open_file(job, d, true)) return false;
     char sql[200];
-    snprintf(sql, sizeof sql, "PRAGMA cache_size = -%d; PRAGMA synchronous = NORMAL", CACHE_KIBIBYTES);
+    snprintf(sql, sizeof sql, "PRAGMA cache_size = -%d; PRAGMA synchronous = NORMAL",
+             IMPORT_PAGE_CACHE_BYTES / 1024);
     if (!run(job, d, sql)) return false;
     if (!there || file.st_size == 0) {
         char page_size[40];

@@ -17,6 +17,7 @@
 
 #define GDAL_CACHE_BYTES ((GIntBig)64 << 20)
 #define MIB 1048576.0
+#define PROCESS_BYTES (58 * MIB) /* measured: code, GDAL with its drivers, PROJ, SQLite */
 
 /* ------------------------------------------------------------------------------ what the parts call back -- */
 bool import_refuse(const import_job *job, const char *format, ...) {
@@ -144,14 +145,17 @@ static int64_t sample_count(const import_work *m) {
     return (int64_t)m->mosaic.lattice.width * m->mosaic.lattice.height;
 }
 
-/* The most memory that any moment of the import takes. */
+/* The most memory that any moment of the import takes, the process and its libraries included. SQLite's cache is
+ * counted whole: what --replace deletes goes through it, too. */
 static bool check_memory(const import_work *m) {
     double n = (double)sample_count(m), blocks = n / (double)(1 << 2 * m->k) * 2 + 64;
     double reading = n * (double)import_kind_bytes(m->mosaic.kind) + n +
-                     (double)import_read_bytes(m->sources, m->count) + (double)GDAL_CACHE_BYTES;
-    double writing = n * sizeof(int32_t) + n + (double)rqt_errors_bytes(&m->mosaic.lattice) + blocks * 64 +
-                     (double)import_blocks_bytes(m->k, m->job.options->jobs) + (32 << 20);
-    double need = reading > writing ? reading : writing;
+                     (double)import_read_bytes(m->sources, m->count) +
+                     fmin((double)GDAL_CACHE_BYTES, n * sizeof(double));
+    double kept = n * sizeof(int32_t) + n + (double)rqt_errors_bytes(&m->mosaic.lattice);
+    double writing =
+        kept + blocks * 64 + (double)import_blocks_bytes(m->k, m->job.options->jobs) + IMPORT_PAGE_CACHE_BYTES;
+    double need = PROCESS_BYTES + (reading > writing ? reading : writing);
     if (need <= (double)m->job.options->memory) return true;
     return import_refuse(&m->job, "%d x %d samples need %.0f MiB of memory to import; --memory allows %.0f",
                          m->mosaic.lattice.width, m->mosaic.lattice.height, ceil(need / MIB),

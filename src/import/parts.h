@@ -121,6 +121,8 @@ bool import_blocks(const import_job *job, const rqt_pyramid *pyramid, int k, dou
 size_t import_blocks_bytes(int k, int jobs);
 
 /* ---------------------------------------------------------------------------------------------- database.c -- */
+#define IMPORT_PAGE_CACHE_BYTES (32 << 20) /* the most that SQLite keeps of the database */
+
 typedef struct import_database {
     sqlite3 *db;
     bool created;  /* the file is ours: it goes when the import fails */

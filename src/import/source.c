@@ -63,6 +63,23 @@ static bool ends_with(const char *text, const char *end) {
     return n >= m && EQUAL(text + n - m, end);
 }
 
+/* What GDAL says about a file that it does not open, without what our sentence says already: the path, and that the
+ * format is none it knows. Its `quotes' become plain ones. */
+static char *reason_of(const char *said, const char *path) {
+    static const char unknown[] = "not recognized as", format[] = "file format";
+    const size_t length = strlen(path);
+    const char *quoted = *said == '`' || *said == '\'' ? said + 1 : said;
+    if (!strncmp(quoted, path, length)) said = quoted + length + strspn(quoted + length, "': ,");
+    const char *known = strncmp(said, unknown, sizeof unknown - 1) ? NULL : strstr(said, format);
+    if (known) said = known + sizeof format - 1;
+    char *reason = CPLStrdup(said + strspn(said, ". "));
+    for (char *at = reason; *at; at++)
+        if (*at == '`') *at = '\'';
+    size_t end = strlen(reason);
+    while (end && (reason[end - 1] == '.' || reason[end - 1] == ' ')) reason[--end] = 0;
+    return reason;
+}
+
 static GDALDatasetH source_open(const import_job *job, const char *path, char **opened) {
     *opened = NULL;
     CPLErrorReset();
@@ -74,7 +91,7 @@ static GDALDatasetH source_open(const import_job *job, const char *path, char **
         import_no_memory(job, "opening a source");
         return NULL;
     }
-    char *why = CPLStrdup(CPLGetLastErrorMsg());
+    char *why = reason_of(CPLGetLastErrorMsg(), path);
     VSIStatBufL file;
     errno = 0;
     bool there = VSIStatL(path, &file) == 0;
