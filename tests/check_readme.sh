@@ -4,7 +4,8 @@
 set -u
 BUILD=${BUILD:-build}
 times='s/[0-9.]* s (reading.*Msamples\/s/TIMES/'
-wanted=$(sed -n '/^```$/,/^```$/p' README.md | grep -v '^```$' | sed "$times")
+blocks() { awk -v kind="$1" '$0 == "```" kind { on = 1; next } /^```/ { if (on) print ""; on = 0 } on' README.md; }
+wanted=$(blocks text | sed "$times")
 got=$(./examples/demo.sh 2>&1 | sed -n '/^# A DEM/,/^white_mountains: sound/p' | sed "$times")
 if [ "$wanted" != "$got" ]; then
     diff <(echo "$wanted") <(echo "$got")
@@ -16,7 +17,6 @@ cmp examples/mount-washington.png "$BUILD/demo/mount-washington.png" || exit 1
 echo "so is its picture"
 
 rm -f build/terrain.gpkg build/pyrenees.gpkg build/mesh.gpkg
-blocks() { awk -v kind="$1" '$0 == "```" kind { on = 1; next } /^```/ { if (on) print ""; on = 0 } on' README.md; }
 run() { # kind, command that reads it
     local kind=$1
     shift
