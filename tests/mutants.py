@@ -83,19 +83,19 @@ MUTANTS = [
      "test_polygons_meet_as_the_oracle_says"),
     # stored bytes
     ("bytes: the checksum is not compared", "src/core/block_codec.c", "checksum64(bytes, size, AT_CHECKSUM)",
-     "get64(bytes + AT_CHECKSUM)", "test_codec", "every_flipped_bit_of_a_block_is_noticed"),
+     "get64(bytes + AT_CHECKSUM)", "test_codec_block", "every_flipped_bit_of_a_block_is_noticed"),
     ("bytes: a short payload passes", "src/core/block_codec.c", "if (got != h->payload)", "if (got < h->payload)",
-     "test_codec", "a_payload_that_lies_is_found_out_under_a_good_checksum"),
+     "test_codec_block", "a_payload_that_lies_is_found_out_under_a_good_checksum"),
     ("bytes: the predictor slips by half a step", "src/core/block_predict.c", "0.5 - 0x1p-21", "0.5",
-     "test_codec", "the_bytes_of_a_block_mean_what_the_format_says"),
+     "test_codec_format", "the_bytes_of_a_block_mean_what_the_format_says"),
     # memory
     ("memory: a refused allocation passes for done", "src/core/selection.c", "if (!slot) return RQT_NO_MEMORY;",
      "if (!slot) return RQT_OK;", "test_core_memory", "one_refused_allocation_is_reported_and_nothing_leaks"),
     # the verifier
     ("verifier: rounds errors down", "src/verify/verify_error.c", "bool cut = rest != 0;", "bool cut = false;",
-     "test_verify", "the_error_is_the_double_nearest_to_the_exact_value"),
+     "test_verify_random", "the_error_is_the_double_nearest_to_the_exact_value"),
     ("verifier: looks at one size of triangle only", "src/verify/verify_overlap.c", "level < LEVELS", "level <= our_level",
-     "test_verify", "triangles_of_very_different_size_are_compared"),
+     "test_verify_random", "triangles_of_very_different_size_are_compared"),
     # the store
     ("store: what a rollback undid stays cached", "src/store/store.c", "s->known = !writing;", "s->known = true;",
      "test_store_faults", "rows_that_we_change_and_roll_back_are_not_remembered"),
@@ -108,7 +108,7 @@ MUTANTS = [
      "if (outline)", "test_store", "every_damage_is_found_where_it_is"),
     # import
     ("import: south-up rasters upside down", "src/import/mosaic.c", "if (!(off <= SLACK))", "if (false)",
-     "test_import", "sources_of_unlike_grids_are_refused"),
+     "test_import_faults", "sources_of_unlike_grids_are_refused"),
     ("import: heights far from zero", "src/import/quantise.c", "(int64_t)middle", "(int64_t)0",
      "test_import", "heights_far_from_zero_lose_nothing"),
 ]
