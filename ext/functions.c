@@ -87,7 +87,7 @@ const function rqt_functions[] = {
                 "squared.",
      .example = "SELECT max_error <= 10, t_junctions, overlaps, uncovered FROM rqt_verify(" SUMMIT ", 10)",
      .fill = fill_verify,
-     .hidden = "void_touched, twice_area_in_cells"},
+     .hidden = "void_touched, twice_area_in_cells, half_cells"},
     {.name = "rqt_explain",
      .arguments = MESH,
      .returns = "level, extent, why, bytes, cached, selected",

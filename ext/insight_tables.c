@@ -258,20 +258,13 @@ static void check_column(void *data, size_t row, int column, sqlite3_context *re
         sqlite3_result_int64(result, (sqlite3_int64)f->block);
 }
 
-/* Does the name, with or without its database, mean this terrain? No name means every one. */
-static bool is_meant(const store_terrain *t, const char *name) {
-    const size_t n = strlen(t->schema);
-    return !name || strcmp(name, t->name) == 0 ||
-           (strncmp(name, t->schema, n) == 0 && name[n] == '.' && strcmp(name + n + 1, t->name) == 0);
-}
-
 static int check_terrains(store *s, const char *name, finding_list *findings, char **error) {
     terrain_list *terrains;
     int code = list_terrains(s, &terrains, error);
     if (code != SQLITE_OK) return code;
     int checked = 0;
     for (int i = 0; i < terrains->count && code == SQLITE_OK; i++) {
-        if (!is_meant(&terrains->rows[i], name)) continue;
+        if (name && !store_name_means(&terrains->rows[i], name)) continue;
         checked++;
         code = store_check(s, &terrains->rows[i], add_finding, findings, error);
     }

@@ -89,6 +89,12 @@ static inline double bits_double(uint64_t bits) {
     return v;
 }
 
+/* One of the root's four corners? */
+static inline bool lattice_is_corner(const rqt_lattice *lattice, rqt_vertex v) {
+    const int32_t side = 1 << lattice->K;
+    return (v.x == 0 || v.x == side) && (v.y == 0 || v.y == side);
+}
+
 /* Where column x (0 .. 2^K) of the lattice sits in the arrays of rqt_errors; -1 when it is past the last sample and
  * no error can reach it. lattice.c */
 int32_t lattice_slot(int32_t x, int32_t samples);

@@ -28,11 +28,6 @@ rqt_status rqt_lattice_init(rqt_lattice *lattice, int64_t width, int64_t height)
     return RQT_OK;
 }
 
-static bool is_corner(const rqt_lattice *lattice, rqt_vertex v) {
-    const int32_t side = 1 << lattice->K;
-    return (v.x == 0 || v.x == side) && (v.y == 0 || v.y == side);
-}
-
 static bool is_inside(const rqt_lattice *lattice, int32_t x, int32_t y) {
     const int32_t side = 1 << lattice->K;
     return x >= 0 && y >= 0 && x <= side && y <= side;
@@ -48,7 +43,7 @@ int rqt_vertex_level(const rqt_lattice *lattice, rqt_vertex v) {
 }
 
 int rqt_vertex_parents(const rqt_lattice *lattice, rqt_vertex v, rqt_vertex parents[2]) {
-    if (is_corner(lattice, v)) return 0;
+    if (lattice_is_corner(lattice, v)) return 0;
     const int scale = rqt_vertex_scale(lattice, v);
     const int32_t q = 1 << scale;
     const bool x_odd = (v.x >> scale) & 1, y_odd = (v.y >> scale) & 1;
@@ -77,7 +72,7 @@ int rqt_vertex_children(const rqt_lattice *lattice, rqt_vertex v, rqt_vertex chi
     const bool x_odd = (v.x >> scale) & 1, y_odd = (v.y >> scale) & 1;
     int n = 0;
     if (x_odd && y_odd) { /* a centre: the four sides of its cell */
-        if (is_corner(lattice, v)) return 0;
+        if (lattice_is_corner(lattice, v)) return 0;
         for (int i = 0; i < 4; i++)
             children[n++] = (rqt_vertex){v.x + step[i][0] * (1 << scale), v.y + step[i][1] * (1 << scale)};
     } else if ((x_odd || y_odd) && scale > 0) { /* on no diagonal: the centres of the four cells around it */

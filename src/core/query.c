@@ -12,8 +12,6 @@
  */
 #include "internal.h"
 
-#include <limits.h>
-
 #define NONE UINT32_MAX
 
 /* A corner of a leaf on its way into the patch. */

@@ -32,11 +32,6 @@ static size_t place_of(uint64_t key, size_t capacity) {
     return (size_t)(h >> 20) & (capacity - 1);
 }
 
-static bool is_corner(const rqt_lattice *lattice, rqt_vertex v) {
-    const int32_t side = 1 << lattice->K;
-    return (v.x == 0 || v.x == side) && (v.y == 0 || v.y == side);
-}
-
 rqt_status rqt_selection_create(const rqt_lattice *lattice, const rqt_allocator *allocator,
                                 rqt_selection **selection) {
     *selection = NULL;
@@ -61,7 +56,7 @@ void rqt_selection_free(rqt_selection *selection) {
 }
 
 bool rqt_selection_has(const rqt_selection *s, rqt_vertex v) {
-    if (is_corner(&s->lattice, v)) return true;
+    if (lattice_is_corner(&s->lattice, v)) return true;
     const uint64_t key = key_of(v);
     for (size_t i = place_of(key, s->capacity);; i = (i + 1) & (s->capacity - 1)) {
         if (s->slot[i] == key) return true;

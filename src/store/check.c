@@ -18,7 +18,6 @@
 #include <string.h>
 
 #define CACHE_BYTES ((size_t)16 << 20)
-#define NEVER 65536 /* FORMAT.md, "Tables": an interval that no eps meets */
 
 /* The block of one level that the walk is in. */
 typedef struct frame {
@@ -395,12 +394,6 @@ static void check_parent(check *c, const frame *f, const frame *parent) {
     tell_difference(c, f, &d, "its parent", parent->number);
 }
 
-static void index_interval(rqt_interval interval, int32_t out[2]) {
-    const bool answers = interval.em < interval.em_parent;
-    out[0] = answers ? interval.em : NEVER;
-    out[1] = answers ? interval.em_parent - 1 : NEVER;
-}
-
 static void check_index(check *c, const frame *f) {
     if (!c->index) return;
     static const char *const names[] = {"extent",
@@ -415,9 +408,9 @@ static void check_index(check *c, const frame *f) {
     const rqt_block_place *p = &f->place;
     int32_t right[8] = {p->x, p->x + p->side < last_x ? p->x + p->side : last_x, p->y,
                         p->y + p->side < last_y ? p->y + p->side : last_y};
-    index_interval(f->summary.tol, right + 4);
-    index_interval(f->summary.exact, right + 6);
-    const bool wanted = right[4] != NEVER || right[6] != NEVER;
+    store_index_interval(f->summary.tol, right + 4);
+    store_index_interval(f->summary.exact, right + 6);
+    const bool wanted = right[4] != STORE_NEVER || right[6] != STORE_NEVER;
     const bool there = step_to(c, c->index, f->number, true);
     const char *wrong = NULL;
     for (int n = 0; n < 8 && there && !wrong; n++)

@@ -181,8 +181,7 @@ static char *names_of(const store *s) {
     return sqlite3_str_finish(out);
 }
 
-/* Does the name mean this terrain? 2: by its own name; 1: as schema.name. */
-static int meant(const store_terrain *t, const char *name) {
+int store_name_means(const store_terrain *t, const char *name) {
     if (strcmp(name, t->name) == 0) return 2;
     const size_t n = strlen(t->schema);
     return strncmp(name, t->schema, n) == 0 && name[n] == '.' && strcmp(name + n + 1, t->name) == 0;
@@ -201,7 +200,7 @@ static int find(store *s, const char *name, const store_terrain **terrain, char 
     } else {
         for (int exact = 2; exact >= 1 && matches == 0; exact--)
             for (int i = 0; i < s->count; i++) {
-                if (meant(&s->terrains[i], name) != exact) continue;
+                if (store_name_means(&s->terrains[i], name) != exact) continue;
                 /* main hides attached databases of the same name, as it does for tables */
                 if (matches++ == 0 || strcmp(s->terrains[i].schema, "main") == 0) found = &s->terrains[i];
                 if (strcmp(found->schema, "main") == 0) matches = 1;

@@ -65,6 +65,8 @@ void store_end(store *s);
  * with a sentence that lists what there is when it is unknown, ambiguous or incomplete. Valid until the next call
  * of store_find on this store. */
 int store_find(store *s, const char *name, const store_terrain **terrain, char **error);
+/* Does the name mean this terrain? 2: by its own name; 1: as "schema.name"; 0: no. */
+int store_name_means(const store_terrain *terrain, const char *name);
 /* All terrains, incomplete ones too, by schema and name. *count entries; release with store_terrains_free. */
 int store_terrains(store *s, store_terrain **terrains, int *count, char **error);
 void store_terrains_free(store_terrain *terrains, int count);
@@ -110,8 +112,6 @@ int store_check(store *s, const store_terrain *t, bool (*tell)(void *context, co
                 void *context, char **error);
 
 /* ---------------------------------------------------------------------------------------------- writing */
-typedef enum store_kind { STORE_GEOPACKAGE, STORE_PLAIN } store_kind;
-
 /* Create what a new, empty database needs: a GeoPackage (application id, core tables). Harmless on one that is a
  * GeoPackage already; leaves every other database as it is. Inside the caller's transaction. */
 int store_make_geopackage(sqlite3 *db, char **error);

@@ -229,12 +229,13 @@ typedef struct terrain {
 
 static void check_proof(sqlite3 *db, terrain *t, double eps, int64_t *vertices, int64_t *triangles, int64_t *area) {
     static const char sql[] = "SELECT vertices, triangles, max_error, rms_error, t_junctions, overlaps, uncovered, "
-                              "void_touched, twice_area_in_cells FROM rqt_verify(NULL, ?1)";
+                              "void_touched, twice_area_in_cells, half_cells FROM rqt_verify(NULL, ?1)";
     sqlite3_stmt *s = ask(db, sql, eps);
     if (sqlite3_step(s) != SQLITE_ROW) stop(db, sql);
     *vertices = sqlite3_column_int64(s, 0);
     *triangles = sqlite3_column_int64(s, 1);
     *area = sqlite3_column_int64(s, 8);
+    const int64_t half_cells = sqlite3_column_int64(s, 9);
     const double max_error = sqlite3_column_double(s, 2);
     printf("  %6g %10lld %10lld %10.4g %10.4g %5lld %5lld %5lld %5lld\n", eps, (long long)*vertices,
            (long long)*triangles, max_error, sqlite3_column_double(s, 3), sqlite3_column_int64(s, 4),
@@ -249,6 +250,7 @@ static void check_proof(sqlite3 *db, terrain *t, double eps, int64_t *vertices, 
     if (!t->has_area) t->twice_area = *area;
     t->has_area = true;
     check(*area == t->twice_area, "the covered area is not that of the first eps");
+    check(*area == half_cells, "the covered area is not that of the half cells with three valid corners");
     if (t->voids == 0)
         check(*area == 2 * (t->width - 1) * (t->height - 1), "the covered area is not that of the whole raster");
 }
