@@ -394,6 +394,13 @@ static void check_parent(check *c, const frame *f, const frame *parent) {
     tell_difference(c, f, &d, "its parent", parent->number);
 }
 
+/* The ends of an index row's interval, said anew on purpose: shared with the writer, its mistakes would be ours. */
+static void index_interval(rqt_interval interval, int32_t ends[2]) {
+    const bool answers = interval.em < interval.em_parent;
+    ends[0] = answers ? interval.em : STORE_NEVER;
+    ends[1] = answers ? interval.em_parent - 1 : STORE_NEVER;
+}
+
 static void check_index(check *c, const frame *f) {
     if (!c->index) return;
     static const char *const names[] = {"extent",
@@ -408,8 +415,8 @@ static void check_index(check *c, const frame *f) {
     const rqt_block_place *p = &f->place;
     int32_t right[8] = {p->x, p->x + p->side < last_x ? p->x + p->side : last_x, p->y,
                         p->y + p->side < last_y ? p->y + p->side : last_y};
-    store_index_interval(f->summary.tol, right + 4);
-    store_index_interval(f->summary.exact, right + 6);
+    index_interval(f->summary.tol, right + 4);
+    index_interval(f->summary.exact, right + 6);
     const bool wanted = right[4] != STORE_NEVER || right[6] != STORE_NEVER;
     const bool there = step_to(c, c->index, f->number, true);
     const char *wrong = NULL;

@@ -41,14 +41,7 @@ int store_read_terrains(sqlite3 *db, store_terrain **terrains, int *count, char 
 /* A new row with complete = 0. terrain.c */
 int store_insert_terrain(sqlite3 *db, const store_terrain *t, int64_t *id, char **error);
 
-/* What a row of the R-tree says of an interval (FORMAT.md, "Tables"): its closed ends, or twice STORE_NEVER, which
- * no eps meets. */
-#define STORE_NEVER 65536
-static inline void store_index_interval(rqt_interval interval, int32_t ends[2]) {
-    const bool answers = interval.em < interval.em_parent;
-    ends[0] = answers ? interval.em : STORE_NEVER;
-    ends[1] = answers ? interval.em_parent - 1 : STORE_NEVER;
-}
+#define STORE_NEVER 65536 /* FORMAT.md, "Tables": both ends of an index row's interval that no eps meets */
 
 /* store_begin, and the state is still the one in which store_find found the terrain. store.c */
 int store_begin_on(store *s, const store_terrain *t, char **error);

@@ -148,11 +148,10 @@ int store_writer_begin(sqlite3 *db, const store_terrain *info, bool replace, sto
 
 /* Does it answer anything? */
 static bool put_interval(sqlite3_stmt *s, int at, rqt_interval interval) {
-    int32_t ends[2];
-    store_index_interval(interval, ends);
-    sqlite3_bind_int(s, at, ends[0]);
-    sqlite3_bind_int(s, at + 1, ends[1]);
-    return ends[0] != STORE_NEVER;
+    const bool answers = interval.em < interval.em_parent;
+    sqlite3_bind_int(s, at, answers ? interval.em : STORE_NEVER);
+    sqlite3_bind_int(s, at + 1, answers ? interval.em_parent - 1 : STORE_NEVER);
+    return answers;
 }
 
 int store_writer_block(store_writer *w, rqt_block_number number, const rqt_summary *summary, const uint8_t *bytes,
