@@ -27,7 +27,7 @@ typedef struct walk {
     rqt_query *query;
     const rqt_allocator *allocator;
     rqt_patch *patch;
-    size_t vertex_capacity, triangle_capacity;
+    size_t vertex_capacity, triangle_capacity, leaf_capacity;
     uint32_t *table; /* open addressing: index of a vertex of the patch, by sample */
     size_t table_size, table_count;
     rqt_selection *selection; /* NULL: by threshold */
@@ -77,6 +77,9 @@ static bool reserve(walk *w) {
                      sizeof *patch->vertices) ||
         !memory_grow(w->allocator, (void **)&patch->triangles, &w->triangle_capacity,
                      patch->triangle_count + triangles, 3 * sizeof *patch->triangles))
+        return false;
+    if (w->query->wants_leaves && !memory_grow(w->allocator, (void **)&patch->leaves, &w->leaf_capacity,
+                                               patch->triangle_count + triangles, sizeof *patch->leaves))
         return false;
     /* A block at the raster's edge may share more, up to all of its vertices, with its own aliases. */
     const size_t entries = w->table_count + (w->clamped ? vertices : shared);
@@ -156,6 +159,7 @@ static void emit(walk *w, const corner *a, const corner *l, const corner *r, boo
     const int64_t cross =
         (int64_t)(l->at.x - a->at.x) * (r->at.y - a->at.y) - (int64_t)(r->at.x - a->at.x) * (l->at.y - a->at.y);
     const uint32_t i = intern(w, a), j = intern(w, l), k = intern(w, r);
+    if (w->query->wants_leaves) w->patch->leaves[w->patch->triangle_count] = (rqt_triangle){a->at, l->at, r->at};
     put_triangle(w, i, j, k, cross < 0);
 }
 
@@ -387,7 +391,7 @@ static void choose(walk *w) {
         chosen[i] = (uint8_t)((error[i] > eps) | ((flags[i] & mask) != 0));
         all &= flags[i];
     }
-    w->plain = all && !w->clamped;
+    w->plain = all && !w->clamped && !w->query->wants_leaves;
     if (!w->selection) return;
     for (size_t i = 0; i < count; i++) {
         const rqt_vertex at = {w->place.x + (int32_t)(i % (size_t)w->n) * w->place.stride,
@@ -458,5 +462,6 @@ void rqt_patch_free(rqt_patch *patch) {
     if (!patch->allocator.resize) return;
     memory_drop(&patch->allocator, patch->vertices);
     memory_drop(&patch->allocator, patch->triangles);
+    memory_drop(&patch->allocator, patch->leaves);
     memset(patch, 0, sizeof *patch);
 }

@@ -172,6 +172,73 @@ void rqt_errors_saturate(rqt_errors *errors);
 rqt_code rqt_errors_at(const rqt_errors *errors, rqt_vertex v, bool *outline);
 void rqt_errors_free(rqt_errors *errors, const rqt_allocator *allocator);
 
+/* --------------------------------------------------------------------------------------------- sweep --
+ * The same errors, saturated, of a raster that passes by in *bands*, for imports in bounded memory ([ALGORITHMS in
+ * src/README.md, "Import"]). A tile is a cell of side 2^b of the lattice; band r holds the tiles of rows r*2^b to
+ * (r+1)*2^b, both ends included, cut at the last row. The memory of two bands is all that the raster's height does
+ * not change.
+ *
+ *   create
+ *   first reading:   rqt_sweep_first for every row y with rqt_sweep_wants, in any order
+ *   second reading, for each band r = 0, 1, ... rqt_sweep_bands - 1:
+ *       rqt_sweep_begin: where the rows go that are not there yet; fill them
+ *       rqt_sweep_tile for every tile of the band, in any order, on any threads
+ *       rqt_sweep_end: band r - 1, and after the last one that one too, is final but for vertices of scale >= b;
+ *       take it (rqt_sweep_band) before the next rqt_sweep_begin
+ *   rqt_sweep_finish: vertices of scale >= b are final: rqt_sweep_coarse
+ *
+ * Codes and outline bits equal those of rqt_errors_compute and rqt_errors_saturate, for every b and any number of
+ * workers. */
+typedef struct rqt_sweep rqt_sweep;
+
+typedef struct rqt_sweep_plan {
+    rqt_lattice lattice;
+    rqt_unit unit;
+    rqt_void_cost cost;
+    int32_t min_q, max_q; /* of the valid samples */
+    bool has_voids;       /* false: valid is not looked at, and no memory is taken for voids */
+    int b;                /* 1 .. K; a tile takes (2^b + 1)^2 samples of working memory per worker */
+    int workers;          /* threads that call rqt_sweep_tile at a time */
+} rqt_sweep_plan;
+
+/* Bytes that a sweep allocates. */
+size_t rqt_sweep_bytes(const rqt_sweep_plan *plan);
+rqt_status rqt_sweep_create(const rqt_sweep_plan *plan, const rqt_allocator *allocator, rqt_sweep **sweep);
+void rqt_sweep_free(rqt_sweep *sweep);
+int32_t rqt_sweep_bands(const rqt_sweep *sweep);
+int32_t rqt_sweep_tiles(const rqt_sweep *sweep); /* in a band */
+
+/* Does the first reading want row y (0 .. height-1)? */
+bool rqt_sweep_wants(const rqt_sweep *sweep, int32_t y);
+/* A whole row of the raster; valid may be NULL when all of it is. */
+void rqt_sweep_first(rqt_sweep *sweep, int32_t y, const int32_t *q, const uint8_t *valid);
+
+/* Rows *first .. *first + *count - 1 are to be written to *q and *valid (NULL without voids), rows of `width`
+ * values without gaps; void samples need validity 0 and any q. */
+void rqt_sweep_begin(rqt_sweep *sweep, int32_t band, int32_t *first, int32_t *count, int32_t **q, uint8_t **valid);
+void rqt_sweep_tile(rqt_sweep *sweep, int worker, int32_t tile);
+void rqt_sweep_end(rqt_sweep *sweep);
+
+/* A band that is final but for its vertices of scale >= b. Reading it is thread-safe. */
+typedef struct rqt_band {
+    int32_t first_row, rows; /* samples: rows of q and valid */
+    const int32_t *q;        /* rows * width */
+    const uint8_t *valid;    /* NULL: all */
+    const rqt_sweep *sweep;
+    int32_t band;
+} rqt_band;
+rqt_band rqt_sweep_band(const rqt_sweep *sweep, int32_t band);
+/* The code and bit of a lattice vertex in the closed band (0 <= x <= 2^K, band*2^b <= y <= (band+1)*2^b); of one
+ * of scale >= b, 0. */
+rqt_code rqt_band_error(const rqt_band *band, rqt_vertex v, bool *outline);
+/* n codes and bits (outline may be NULL) of the vertices (x + i*step, y), quickly. */
+void rqt_band_errors(const rqt_band *band, int32_t x, int32_t y, int32_t step, int32_t n, rqt_code *codes,
+                     uint8_t *outline);
+void rqt_sweep_finish(rqt_sweep *sweep);
+/* The sample of a lattice vertex of scale >= b, known since the first reading; and, when finished, its code and
+ * bit. *flags: RQT_VALID | RQT_OUTLINE. */
+rqt_code rqt_sweep_coarse(const rqt_sweep *sweep, rqt_vertex v, int32_t *q, uint8_t *flags);
+
 /* ----------------------------------------------------------------------------------------- selection --
  * A set of lattice vertices. Closed sets are exactly the crack-free meshes: with its four corners (always in,
  * never stored) and every parent of every member. */
@@ -229,6 +296,11 @@ typedef struct rqt_block {
     int32_t *q;
     rqt_code *error; /* saturated */
     uint8_t *flags;  /* RQT_VALID | RQT_OUTLINE */
+    /* A block of stride > 1 is *sparse*: it answers only where eps >= floor (its em for the outline `tol`), so a
+     * vertex with error <= floor and without outline bit, other than a corner, is never selected in it. Such a
+     * vertex is not kept: its q and error are not stored. */
+    bool sparse;
+    rqt_code floor; /* 0 unless sparse */
 } rqt_block;
 
 rqt_status rqt_block_create(int k, const rqt_allocator *allocator, rqt_block *block);
@@ -367,6 +439,7 @@ typedef struct rqt_patch {
     uint32_t
         *triangles; /* 3 * triangle_count indices, counter-clockwise seen from above, in the order of the walk */
     size_t triangle_count;
+    rqt_triangle *leaves; /* NULL unless the query asked: the same triangles by lattice vertices, unclamped */
     rqt_allocator allocator;
 } rqt_patch;
 
@@ -387,6 +460,7 @@ typedef struct rqt_query {
     rqt_code eps;
     rqt_select select;
     rqt_outline outline;
+    bool wants_leaves;   /* fill patch->leaves */
     rqt_answer *answers; /* in any order; sorted into Morton order by the query */
     size_t answer_count;
     /* The decoded block of a number, valid until the next call. NULL: the query stops with RQT_READ_FAILED. */
