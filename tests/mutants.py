@@ -12,7 +12,7 @@ import sys
 
 MUTANTS = [
     # the bound
-    ("bound: fewer samples count", "src/core/deviation.c",
+    ("bound: fewer samples count", "src/core/error.c",
      "const int64_t most = dm > dp ? (dm > dn ? dm : dn) : (dp > dn ? dp : dn);", "const int64_t most = dm;",
      "test_core_lattice", "errors_equal_the_oracles_on_adversarial_surfaces"),
     ("bound: 32 bits where they are too few", "src/core/deviation.c",
@@ -20,7 +20,7 @@ MUTANTS = [
      "test_core_lattice", "errors_equal_the_oracles_on_adversarial_surfaces"),
     ("bound: the plane tilts the wrong way", "src/core/deviation.c", "        if (a.y == y0) gy = -gy;\n", "",
      "test_core_lattice", "a_plane_has_no_error_anywhere"),
-    ("bound: clamped triangles taken for nested", "src/core/deviation.c",
+    ("bound: clamped triangles taken for nested", "src/core/error.c",
      "if (clamped) return visit_irregular(s, t, m, -1);", "if (clamped) return visit_irregular(s, t, m, state);",
      "test_core_lattice", "errors_equal_the_oracles_for_every_small_extent"),
     ("bound: eps ignores what quantisation lost", "src/core/code.c",

@@ -46,7 +46,7 @@ static void bare_triangles_in_any_order_make_a_strip(void **state) {
     random_begin("bare triangles");
     rqt_patch_vertex vertices[60] = {0};
     uint32_t triangles[3 * 50] = {0, 1, 2};
-    rqt_patch p = {vertices, 3, triangles, 1, test_allocator};
+    rqt_patch p = {vertices, 3, triangles, 1, NULL, test_allocator};
     size_t n;
     check_strip(&p, &n);
     assert_int_equal(n, 3);
