@@ -104,8 +104,8 @@ MUTANTS = [
      "test_store_faults", "a_commit_in_the_middle_of_a_query_is_not_mixed_in"),
     ("store: an interval too long by one", "src/store/writer.c", "interval.em_parent - 1", "interval.em_parent",
      "test_store", "sound_terrains_have_no_findings"),
-    ("check: errors of parent and child differ", "src/store/check.c", "if (f->block.error[above] < error || outline)",
-     "if (outline)", "test_store", "every_damage_is_found_where_it_is"),
+    ("check: errors of parent and child differ", "src/store/check.c", "if ((f->block.error[above] < error || outline) &&",
+     "if (outline &&", "test_store", "every_damage_is_found_where_it_is"),
     # import
     ("import: south-up rasters upside down", "src/import/mosaic.c", "if (!(off <= SLACK))", "if (false)",
      "test_import_faults", "sources_of_unlike_grids_are_refused"),

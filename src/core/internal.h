@@ -95,6 +95,15 @@ static inline bool lattice_is_corner(const rqt_lattice *lattice, rqt_vertex v) {
     return (v.x == 0 || v.x == side) && (v.y == 0 || v.y == side);
 }
 
+/* Does the diamond of a vertex have an area on the raster? Without one, past the last column or row, no triangle of
+ * a mesh has it for a corner, and its error is stored as 0: so that what is stored does not depend on how far past
+ * the raster somebody looked. The root's corners always count. */
+static inline bool lattice_has_area(const rqt_lattice *lattice, rqt_vertex v) {
+    if (lattice_is_corner(lattice, v)) return true;
+    const int32_t q = (v.x | v.y) & -(v.x | v.y);
+    return v.x - q < lattice->width - 1 && v.y - q < lattice->height - 1;
+}
+
 /* Where column x (0 .. 2^K) of the lattice sits in the arrays of rqt_errors; -1 when it is past the last sample and
  * no error can reach it. lattice.c */
 int32_t lattice_slot(int32_t x, int32_t samples);

@@ -55,6 +55,12 @@ static size_t list_level(const rqt_pyramid *p, int level, int depth, int32_t i, 
     return n;
 }
 
+/* The stored error of a vertex. */
+static rqt_code stored_error(const rqt_errors *errors, rqt_vertex v, bool *outline) {
+    *outline = false;
+    return lattice_has_area(&errors->lattice, v) ? rqt_errors_at(errors, v, outline) : 0;
+}
+
 /* em of a block from its four quarters: what their own grids add between their stride and this one's, and their em.
  */
 static void find_em(const rqt_pyramid *p, node *block) {
@@ -74,7 +80,7 @@ static void find_em(const rqt_pyramid *p, node *block) {
         for (int32_t u = v & 1 ? 0 : 1; u <= n; u += v & 1 ? 1 : 2) {
             bool outline;
             const rqt_vertex at = {place.x + u * half, place.y + v * half};
-            const rqt_code code = rqt_errors_at(p->errors, at, &outline);
+            const rqt_code code = stored_error(p->errors, at, &outline);
             if (code > block->em) block->em = code;
             block->outline |= outline;
         }
@@ -129,7 +135,7 @@ static rqt_summary_vertex summary_vertex(const rqt_pyramid *p, int32_t x, int32_
     rqt_summary_vertex out;
     bool outline;
     out.q = sample(p->grid, v, &out.flags);
-    out.error = rqt_errors_at(p->errors, v, &outline);
+    out.error = stored_error(p->errors, v, &outline);
     if (outline) out.flags |= RQT_OUTLINE;
     return out;
 }
@@ -151,7 +157,7 @@ static void summarize(const rqt_pyramid *p, const node *b, const rqt_block_place
         bool outline;
         uint8_t flags;
         const rqt_vertex center = {x + side / 2, y + side / 2};
-        summary->center_error = rqt_errors_at(p->errors, center, &outline);
+        summary->center_error = stored_error(p->errors, center, &outline);
         (void)sample(p->grid, center, &flags);
         summary->center_flags = (uint8_t)(flags | (outline ? RQT_OUTLINE : 0));
     }
@@ -184,8 +190,10 @@ void rqt_pyramid_block(const rqt_pyramid *p, size_t n, rqt_block_number *number,
             uint8_t flags;
             bool outline;
             block->q[i] = sample(p->grid, at, &flags);
-            block->error[i] = rqt_errors_at(p->errors, at, &outline);
+            block->error[i] = stored_error(p->errors, at, &outline);
             block->flags[i] = (uint8_t)(flags | (outline ? RQT_OUTLINE : 0));
         }
     }
+    block->sparse = place.stride > 1;
+    block->floor = block->sparse ? b->em : 0;
 }

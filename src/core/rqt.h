@@ -377,6 +377,54 @@ size_t rqt_pyramid_count(const rqt_pyramid *pyramid); /* blocks of all levels */
 void rqt_pyramid_block(const rqt_pyramid *pyramid, size_t n, rqt_block_number *number, rqt_summary *summary,
                        rqt_block *block);
 
+/* --------------------------------------------------------------------------------------------- build --
+ * The same blocks out of the bands of a sweep, for an import in bounded memory: those of a side of up to 2^b tile
+ * by tile as their band becomes final, the coarser ones at the end, out of a scratch file of every S-th vertex, S =
+ * 2^(b-k+1). Blocks and summaries equal those of rqt_pyramid, for every b.
+ *
+ *   create
+ *   for every final band, every tile of it, in any order, on any threads: rqt_build_tile
+ *       when all tiles of the band are built: rqt_build_keep
+ *   after rqt_sweep_finish, for each level from rqt_build_coarsest_in_tile - 1 down to 0, every cell of it, in any
+ *       order, on any threads: rqt_build_coarse
+ *   then, for every block: rqt_build_summary
+ */
+typedef struct rqt_build rqt_build;
+
+/* A file of nothing but our own bytes. false: it failed, and the build stops with RQT_READ_FAILED. read is called
+ * from several threads at once. */
+typedef struct rqt_scratch_file {
+    bool (*write)(void *context, uint64_t offset, const void *bytes, size_t size);
+    bool (*read)(void *context, uint64_t offset, void *bytes, size_t size);
+    void *context;
+} rqt_scratch_file;
+
+/* Is called with each block that is made. summary: complete but for the intervals and for vertices of scale >= b;
+ * keep it for rqt_build_summary. false stops. */
+typedef bool rqt_build_emit(void *context, rqt_block_number number, const rqt_summary *summary,
+                            const rqt_block *block);
+
+size_t rqt_build_bytes(const rqt_lattice *lattice, int k, int b);
+/* k <= b <= K as in the sweep. file may be NULL when K == b. */
+rqt_status rqt_build_create(const rqt_lattice *lattice, int k, int b, const rqt_scratch_file *file,
+                            const rqt_allocator *allocator, rqt_build **build);
+void rqt_build_free(rqt_build *build);
+size_t rqt_build_count(const rqt_build *build); /* blocks of all levels */
+/* block: room for one of this k, for this thread. */
+rqt_status rqt_build_tile(rqt_build *build, const rqt_band *band, int32_t tile, rqt_block *block,
+                          rqt_build_emit *emit, void *context);
+rqt_status rqt_build_keep(rqt_build *build, const rqt_band *band);
+/* The level of the largest blocks that a tile holds. */
+int rqt_build_coarsest_in_tile(const rqt_build *build);
+int32_t rqt_build_cells(const rqt_build *build, int level); /* blocks of a level */
+rqt_status rqt_build_coarse(rqt_build *build, const rqt_sweep *sweep, int level, int32_t cell, rqt_block *block,
+                            rqt_build_emit *emit, void *context);
+/* What was missing in the summary of the block: its vertices of scale >= b and its intervals. */
+void rqt_build_summary(const rqt_build *build, const rqt_sweep *sweep, rqt_block_number number,
+                       rqt_summary *summary);
+/* The largest finite error of the terrain, when all is built. */
+rqt_code rqt_build_max_error(const rqt_build *build);
+
 /* ------------------------------------------------------------------------------------------- regions --
  * A geometry as it came (WKT or EWKT text, GeoPackage or SpatiaLite bytes), in its own coordinates; and a
  * region: the same in sample coordinates, each rounded to the nearest 2^-20 sample, exact integers after that.

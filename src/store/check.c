@@ -251,8 +251,16 @@ static bool is_sample(const rqt_lattice *lattice, rqt_vertex v) {
     return v.x < lattice->width && v.y < lattice->height;
 }
 
+/* Has a triangle with this vertex for a corner an area? They all lie within the largest power of two that divides
+ * both coordinates. Vertices without one have no error. */
+static bool has_area(const rqt_lattice *lattice, rqt_vertex v) {
+    int32_t reach = 1;
+    while (reach < 1 << lattice->K && v.x % (2 * reach) == 0 && v.y % (2 * reach) == 0) reach *= 2;
+    return is_root_corner(lattice, v) || (v.x - reach < lattice->width - 1 && v.y - reach < lattice->height - 1);
+}
+
 typedef struct inside {
-    tally infinite, unsaturated, too_small, no_outline;
+    tally infinite, unsaturated, too_small, no_outline, past;
 } inside;
 
 /* One triangle that vertex m splits: apex p, its hypotenuse through m at a right angle to the way from m to p. Of
@@ -286,18 +294,23 @@ static void check_inside(check *c, frame *f) {
             const rqt_code error = f->block.error[i];
             const bool root_corner = is_root_corner(lattice, at);
             if ((error == RQT_CODE_INFINITY) != root_corner) count(&found.infinite, at);
+            if (!is_sample(lattice, at) && (error || f->block.flags[i] & RQT_OUTLINE) && !has_area(lattice, at))
+                count(&found.past, at);
             if (error != RQT_CODE_INFINITY && error > c->max_error) c->max_error = error;
             rqt_vertex parents[2];
             for (int p = rqt_vertex_parents(lattice, at, parents); p-- > 0;) {
                 const ptrdiff_t above = place_in(f, parents[p]);
                 if (above < 0) continue;
                 const int outline = f->block.flags[i] & ~f->block.flags[above] & RQT_OUTLINE;
-                if (f->block.error[above] < error || outline) count(&found.unsaturated, parents[p]);
+                if ((f->block.error[above] < error || outline) &&
+                    (is_sample(lattice, parents[p]) || has_area(lattice, parents[p])))
+                    count(&found.unsaturated, parents[p]);
                 check_triangle(c, f, at, parents[p], &found);
             }
         }
     }
     tell_tally(c, f, &found.infinite, "has infinite errors elsewhere than at the root's corners, or not there");
+    tell_tally(c, f, &found.past, "has an error at a vertex past the raster, where no triangle has an area");
     tell_tally(c, f, &found.unsaturated, "has a vertex with less error or outline than one that depends on it");
     tell_tally(c, f, &found.too_small, "has an error smaller than what its vertex itself is off");
     tell_tally(c, f, &found.no_outline, "has a vertex between data and void without outline bit");
