@@ -154,6 +154,13 @@ equal("--replace without --minimal takes the tables away", rows(db, "SELECT name
 equal("... and out of the GeoPackage", rows(db, "SELECT table_name FROM gpkg_contents WHERE table_name LIKE '%minimal%'"), [])
 equal("... and the metric works without them", one(db, "SELECT count(*) > 100 FROM rqt_range(NULL, 1, NULL, ?)", options(metric="minimal")), 1)
 
+# ---------------------------------------------------------------------- too large a terrain is refused before anything is done
+wide, nowhere = s.temp("wide.tif"), s.temp("wide.gpkg")
+s.run(["gdal_create", "-outsize", "9000", "6000", "-bands", "1", "-co", "SPARSE_OK=TRUE", "-co", "TILED=YES", wide])
+said, status = s.run([s.RQT, "import", "--memory", "4096", "--minimal", wide, nowhere])
+check("rqt import --minimal says how much it would take, and leaves nothing", status != 0 and "minimal errors take" in said
+      and "512 are allowed" in said and not os.path.exists(nowhere), said)
+
 # ------------------------------------------------------------------- what is computed is forgotten when the database changes
 before = triangles(db, None, 5, "t", options(metric="local"))
 s.import_terrain(path, s.temp("square.asc"), name="t", replace=True)
