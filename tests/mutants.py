@@ -60,7 +60,7 @@ MUTANTS = [
     ("minimal: a leaf that is not there is split", "src/core/minimal.c", "least(f->deviation[2 * at], apex0)", "f->deviation[2 * at]",
      "test_core_metric", "no_mesh_of_5_by_5_is_smaller_or_nearer_within_its_size"),
     ("wedgie: no bound at the raster's edge", "src/core/metric.c", "nested > least ? nested : least", "nested + 0 * least",
-     "test_core_metric", "what_is_called_a_bound_is_one"),
+     "test_core_metric", "local_wedgie_and_euclid_are_their_definitions"),
     ("fans: a clockwise run begins where others do", "src/core/strip_fans.c", "(odd ? 1u : 0u)", "(0u * odd)",
      "test_core_fans", "every_metric_answers_alike_by_all_ways_and_blocks"),
     # far heights and the interval pyramid
