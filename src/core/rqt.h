@@ -441,6 +441,9 @@ typedef struct rqt_patch {
     size_t triangle_count;
     rqt_triangle *leaves; /* NULL unless the query asked: the same triangles by lattice vertices, unclamped */
     rqt_allocator allocator;
+    uint32_t *strip; /* NULL unless the query asked: what rqt_strip_build makes of the triangles */
+    size_t strip_count;
+    size_t vertex_capacity, triangle_capacity, leaf_capacity, strip_capacity; /* elements there is room for */
 } rqt_patch;
 
 void rqt_patch_free(rqt_patch *patch);
@@ -453,6 +456,18 @@ typedef struct rqt_answer { /* a block of the index that answers eps and whose e
     rqt_summary summary;
 } rqt_answer;
 
+/* What a patch is to hold beside its vertices. triangle_count is told in any case. */
+typedef enum rqt_product { RQT_PRODUCT_TRIANGLES, RQT_PRODUCT_STRIP, RQT_PRODUCT_VERTICES } rqt_product;
+
+/* Memory that one query leaves to the next, so that not every query has to ask for it and touch it anew. For one
+ * thread. */
+typedef struct rqt_scratch rqt_scratch;
+rqt_status rqt_scratch_create(const rqt_allocator *allocator, rqt_scratch **scratch);
+void rqt_scratch_free(rqt_scratch *scratch);
+/* Instead of rqt_patch_free: the patch's memory goes to the next query. What is kept is at most `limit` bytes, the
+ * rest is released. */
+void rqt_scratch_keep(rqt_scratch *scratch, rqt_patch *patch, size_t limit);
+
 typedef struct rqt_query {
     rqt_lattice lattice;
     int k;
@@ -460,8 +475,10 @@ typedef struct rqt_query {
     rqt_code eps;
     rqt_select select;
     rqt_outline outline;
-    bool wants_leaves;   /* fill patch->leaves */
-    rqt_answer *answers; /* in any order; sorted into Morton order by the query */
+    rqt_product product;
+    bool wants_leaves;    /* fill patch->leaves; with RQT_PRODUCT_TRIANGLES only */
+    rqt_scratch *scratch; /* NULL: none; made with the same allocator as the query is run with */
+    rqt_answer *answers;  /* in any order; sorted into Morton order by the query */
     size_t answer_count;
     /* The decoded block of a number, valid until the next call. NULL: the query stops with RQT_READ_FAILED. */
     const rqt_block *(*read_block)(void *context, rqt_block_number number);
@@ -473,6 +490,9 @@ typedef struct rqt_query {
 bool rqt_summary_answers(const rqt_summary *summary, rqt_outline outline, rqt_code eps);
 /* Does the query need this block's bytes, or is its summary enough? */
 bool rqt_summary_needs_block(const rqt_summary *summary, rqt_outline outline, rqt_code eps);
+/* Does this query need an answer's bytes? Not where the summary is enough, nor where the block only touches the
+ * region. Queries that close their selection (rqt_select) look at all that summaries leave open. */
+bool rqt_query_needs_block(const rqt_query *query, const rqt_answer *answer);
 /* The patch of a query (mode `cover`): each kept leaf that belongs to the region, once. */
 rqt_status rqt_query_run(rqt_query *query, const rqt_allocator *allocator, rqt_patch *patch);
 
