@@ -239,10 +239,15 @@ static void look_up_border(walk *w) {
             count += w->chosen[at[c]];
         }
     }
+    for (size_t b = 0; b < count; b++) { /* the table is large and lies all over memory */
+        const rqt_vertex at = place_vertex(w, border[b].place);
+        border[b].slot = table_slot(at.x, at.y, s->table_size);
+        __builtin_prefetch(&s->table[border[b].slot]);
+    }
     for (size_t b = 0; b < count; b++) {
         const uint32_t place = border[b].place;
         const rqt_vertex at = place_vertex(w, place);
-        const shared_vertex *v = table_find(w, table_slot(at.x, at.y, s->table_size), at.x, at.y);
+        const shared_vertex *v = table_find(w, border[b].slot, at.x, at.y);
         if (v->stamp == s->stamp) {
             w->memo[place] = v->index | KNOWN;
         } else {

@@ -27,19 +27,30 @@ typedef struct half {
 /* ----------------------------------------------------------------------------------------------- selection */
 
 void walk_choose(walk *w) {
+    enum { STEP = 64 };
     const size_t count = (size_t)w->n * (size_t)w->n;
     const rqt_code eps = w->query->eps, *restrict const error = w->block->error;
     const uint8_t mask = w->query->outline == RQT_OUTLINE_EXACT ? RQT_OUTLINE : 0;
     const uint8_t *restrict const flags = w->block->flags;
+    const int32_t *const q = w->block->q;
     uint8_t *restrict const chosen = w->chosen;
     uint8_t all = RQT_VALID;
-    for (size_t i = 0; i < count; i++) {
+    size_t i = 0;
+    for (; i + STEP <= count; i += STEP) {
+        /* The heights are wanted later, here and there: have them come while the errors stream by. */
+        for (size_t line = 0; line < STEP; line += 16) __builtin_prefetch(q + i + line);
+        for (size_t j = i; j < i + STEP; j++) {
+            chosen[j] = (uint8_t)((error[j] > eps) | ((flags[j] & mask) != 0));
+            all &= flags[j];
+        }
+    }
+    for (; i < count; i++) {
         chosen[i] = (uint8_t)((error[i] > eps) | ((flags[i] & mask) != 0));
         all &= flags[i];
     }
     w->plain = all && !w->clamped && !w->aliased && !w->query->wants_leaves;
     if (!w->selection) return;
-    for (size_t i = 0; i < count; i++) {
+    for (i = 0; i < count; i++) {
         const rqt_vertex at = {w->place.x + (int32_t)(i % (size_t)w->n) * w->place.stride,
                                w->place.y + (int32_t)(i / (size_t)w->n) * w->place.stride};
         chosen[i] = rqt_selection_has(w->selection, at);
