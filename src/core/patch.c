@@ -221,7 +221,7 @@ bool patch_reserve(walk *w) {
 /* --------------------------------------------------------------------------------------- vertices of a block */
 
 static rqt_vertex place_vertex(const walk *w, uint32_t place) {
-    const int32_t u = (int32_t)place % w->n, v = (int32_t)place / w->n;
+    const int32_t v = (int32_t)(place * w->inverse >> 32), u = (int32_t)place - v * w->n;
     return (rqt_vertex){w->place.x + u * w->place.stride, w->place.y + v * w->place.stride};
 }
 
@@ -274,23 +274,20 @@ void patch_enter_block(walk *w) {
 /* The records of the vertices that the walk has put in order. */
 static void fill_records(walk *w) {
     const rqt_block *b = w->block;
-    const rqt_block_place *p = &w->place;
     const int K = w->query->lattice.K;
-    const uint32_t n = (uint32_t)w->n;
-    const uint64_t inverse = (UINT64_C(1) << 32) / n + 1; /* to divide places, which are below 2^17 */
     const size_t count = w->patch->vertex_count - w->first;
     rqt_patch_vertex *out = w->patch->vertices + w->first;
     const uint32_t *order = w->order;
     for (size_t i = 0; i < count; i++, out++) {
         const uint32_t place = order[i];
         if (place == NO_PLACE) continue;
-        const uint32_t row = (uint32_t)(place * inverse >> 32), col = place - row * n;
-        const int32_t x = p->x + (int32_t)col * p->stride, y = p->y + (int32_t)row * p->stride;
-        *out = (rqt_patch_vertex){.col = x,
-                                  .row = y,
-                                  .q = b->q[place],
-                                  .error = b->error[place],
-                                  .level = (uint8_t)(K - __builtin_ctz((uint32_t)(x | y) | UINT32_C(1) << K))};
+        const rqt_vertex at = place_vertex(w, place);
+        *out =
+            (rqt_patch_vertex){.col = at.x,
+                               .row = at.y,
+                               .q = b->q[place],
+                               .error = b->error[place],
+                               .level = (uint8_t)(K - __builtin_ctz((uint32_t)(at.x | at.y) | UINT32_C(1) << K))};
     }
 }
 

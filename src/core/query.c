@@ -248,6 +248,7 @@ rqt_status rqt_query_run(rqt_query *query, const rqt_allocator *allocator, rqt_p
               .scratch = own ? own : query->scratch,
               .fine_levels = rqt_block_levels(&query->lattice, query->k),
               .n = (1 << query->k) + 1};
+    w.inverse = (UINT64_C(1) << 32) / (uint64_t)w.n + 1; /* places are below 2^17 */
     const rqt_status status = patch_begin(&w) ? run(&w) : RQT_NO_MEMORY;
     rqt_selection_free(w.selection);
     patch_end(&w, status);

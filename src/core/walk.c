@@ -26,119 +26,127 @@ typedef struct half {
 
 /* ----------------------------------------------------------------------------------------------- selection */
 
-void walk_choose(walk *w) {
+/* One binary for every machine: the wider instructions where the processor has them, the same bytes everywhere. */
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
+    !defined(RQT_SCALAR)
+#define VECTOR_CLONES __attribute__((target_clones("avx2", "default")))
+#else
+#define VECTOR_CLONES
+#endif
+
+/* chosen = error > eps or a flag of the mask. Returns the flags that all have. */
+VECTOR_CLONES
+static uint8_t choose_by_error(const rqt_block *b, size_t count, rqt_code eps, uint8_t mask, uint8_t *chosen) {
     enum { STEP = 64 };
-    const size_t count = (size_t)w->n * (size_t)w->n;
-    const rqt_code eps = w->query->eps, *restrict const error = w->block->error;
-    const uint8_t mask = w->query->outline == RQT_OUTLINE_EXACT ? RQT_OUTLINE : 0;
-    const uint8_t *restrict const flags = w->block->flags;
-    const int32_t *const q = w->block->q;
-    uint8_t *restrict const chosen = w->chosen;
-    uint8_t all = RQT_VALID;
+    const rqt_code *restrict const error = b->error;
+    const uint8_t *restrict const flags = b->flags;
+    uint8_t *restrict const out = chosen;
+    uint8_t all = 0xFF;
     size_t i = 0;
     for (; i + STEP <= count; i += STEP) {
         /* The heights are wanted later, here and there: have them come while the errors stream by. */
-        for (size_t line = 0; line < STEP; line += 16) __builtin_prefetch(q + i + line);
+        for (size_t line = 0; line < STEP; line += 16) __builtin_prefetch(b->q + i + line);
         for (size_t j = i; j < i + STEP; j++) {
-            chosen[j] = (uint8_t)((error[j] > eps) | ((flags[j] & mask) != 0));
+            out[j] = (uint8_t)((error[j] > eps) | ((flags[j] & mask) != 0));
             all &= flags[j];
         }
     }
     for (; i < count; i++) {
-        chosen[i] = (uint8_t)((error[i] > eps) | ((flags[i] & mask) != 0));
+        out[i] = (uint8_t)((error[i] > eps) | ((flags[i] & mask) != 0));
         all &= flags[i];
     }
+    return all;
+}
+
+void walk_choose(walk *w) {
+    const size_t count = (size_t)w->n * (size_t)w->n;
+    const uint8_t mask = w->query->outline == RQT_OUTLINE_EXACT ? RQT_OUTLINE : 0;
+    const bool all = choose_by_error(w->block, count, w->query->eps, mask, w->chosen) & RQT_VALID;
     w->plain = all && !w->clamped && !w->aliased && !w->query->wants_leaves;
     if (!w->selection) return;
-    for (i = 0; i < count; i++) {
+    for (size_t i = 0; i < count; i++) {
         const rqt_vertex at = {w->place.x + (int32_t)(i % (size_t)w->n) * w->place.stride,
                                w->place.y + (int32_t)(i / (size_t)w->n) * w->place.stride};
-        chosen[i] = rqt_selection_has(w->selection, at);
+        w->chosen[i] = rqt_selection_has(w->selection, at);
     }
 }
 
 /* ------------------------------------------------------------------------------------------- without care */
 
-/* A second child that waits for its turn. */
+/* A second child that waits for its turn. state: twice the splits it has left, and 1 if it is left by a leg. */
 typedef struct later {
-    uint32_t a, l, r;
-    int16_t splits;
-    bool leaves_by_leg;
+    uint32_t a, l, r, state;
 } later;
 
-/* Where the loop stands. */
+/* Where the loop stands. Choices are made of masks: as branches nobody could foresee them. */
 typedef struct cursor {
     uint32_t a, l, r;
-    int splits;
-    bool enters_by_leg, leaves_by_leg;
-    uint32_t next; /* the vertex that comes next, with FRESH */
-    int depth;     /* of the stack */
+    uint32_t splits;
+    uint32_t by_leg_in, by_leg_out; /* 1: entered, left by a leg; 0: by the hypotenuse */
+    uint64_t next; /* the vertex that comes next, with FRESH; above it, how many splits there were */
 } cursor;
 
-/* Down along the first children to a leaf. */
-static inline __attribute__((always_inline)) void descend(const walk *w, cursor *c, later *stack) {
+#define ONE_SPLIT (UINT64_C(1) << 32)
+
+static inline __attribute__((always_inline)) uint32_t choose(uint32_t one, uint32_t yes, uint32_t no) {
+    return no ^ ((yes ^ no) & (0 - one));
+}
+
+/* Down along the first children to a leaf. Returns the top of the stack. */
+static inline __attribute__((always_inline)) later *descend(const walk *w, cursor *c, later *top) {
     const uint8_t *restrict const chosen = w->chosen;
     uint32_t *restrict const memo = w->memo, *restrict const order = w->order;
-    const uint32_t first = (uint32_t)w->first | FRESH, live = w->live;
+    const uint32_t live = w->live, first = (uint32_t)w->first | FRESH;
     for (;;) {
         const uint32_t m = (c->l + c->r) / 2;
-        if (c->splits == 0 || !chosen[m]) return;
-        const uint32_t left = memo[m];
+        if (c->splits == 0 || !chosen[m]) return top;
+        const uint32_t left = memo[m], next = (uint32_t)c->next;
         const bool fresh = left < live;
-        memo[m] = fresh ? c->next : left;
-        order[c->next - first] = m;
-        c->next += fresh;
+        memo[m] = fresh ? next : left;
+        order[next - first] = m;
+        c->next += ONE_SPLIT + fresh;
         c->splits--;
-        stack[c->depth++] = (later){m, c->a, c->r, (int16_t)c->splits, !c->leaves_by_leg};
+        *top++ = (later){m, c->a, c->r, 2 * c->splits + (c->by_leg_out ^ 1)};
         c->r = c->a;
         c->a = m;
-        c->enters_by_leg = !c->enters_by_leg;
-        c->leaves_by_leg = true;
+        c->by_leg_in ^= 1;
+        c->by_leg_out = 1;
     }
 }
 
-static inline __attribute__((always_inline)) void take_later(cursor *c, const later *stack) {
-    const later *const top = &stack[--c->depth];
+static inline __attribute__((always_inline)) void take_later(cursor *c, const later *top) {
     c->a = top->a;
     c->l = top->l;
     c->r = top->r;
-    c->splits = top->splits;
-    c->enters_by_leg = true;
-    c->leaves_by_leg = top->leaves_by_leg;
+    c->splits = top->state / 2;
+    c->by_leg_in = 1;
+    c->by_leg_out = top->state & 1;
 }
 
 #define MOST_SPLITS (2 * RQT_MAX_BLOCK_K)
 
-static size_t list_triangles(walk *w, cursor *at, bool clockwise, uint32_t *restrict out) {
-    later stack[MOST_SPLITS];
-    const uint32_t *const memo = w->memo;
-    cursor c = *at;
-    const bool turn = clockwise ^ (c.splits & 1);
-    uint32_t *const begin = out;
-    for (;; take_later(&c, stack)) {
-        descend(w, &c, stack);
-        const bool now = turn ^ (c.splits & 1);
+static cursor list_triangles(const walk *w, cursor c, bool clockwise, uint32_t *restrict out) {
+    later stack[MOST_SPLITS], *top = stack;
+    const uint32_t *const memo = w->memo, turn = clockwise ^ (c.splits & 1);
+    for (;;) {
+        top = descend(w, &c, top);
+        const uint32_t l = memo[c.l] & INDEX, r = memo[c.r] & INDEX, swap = (l ^ r) & (0 - (turn ^ (c.splits & 1)));
         out[0] = memo[c.a] & INDEX;
-        out[1] = memo[now ? c.l : c.r] & INDEX;
-        out[2] = memo[now ? c.r : c.l] & INDEX;
+        out[1] = r ^ swap;
+        out[2] = l ^ swap;
         out += 3;
-        if (c.depth == 0) break;
+        if (top == stack) return c;
+        take_later(&c, --top);
     }
-    *at = c;
-    return (size_t)(out - begin) / 3;
 }
 
-static size_t count_triangles(walk *w, cursor *at) {
-    later stack[MOST_SPLITS];
-    cursor c = *at;
-    size_t count = 0;
-    for (;; take_later(&c, stack)) {
-        descend(w, &c, stack);
-        count++;
-        if (c.depth == 0) break;
+static cursor visit_vertices(const walk *w, cursor c) {
+    later stack[MOST_SPLITS], *top = stack;
+    for (;;) {
+        top = descend(w, &c, top);
+        if (top == stack) return c;
+        take_later(&c, --top);
     }
-    *at = c;
-    return count;
 }
 
 /* The leaf that the cursor is at, counter-clockwise. */
@@ -148,46 +156,37 @@ static void leaf_at(const walk *w, const cursor *c, bool clockwise, uint32_t tri
     triangle[2] = w->memo[clockwise ? c->r : c->l] & INDEX;
 }
 
-static size_t strip_triangles(walk *w, cursor *at, bool clockwise) {
-    later stack[MOST_SPLITS];
+static cursor strip_triangles(const walk *w, cursor c, bool clockwise, strip_writer *strip) {
+    later stack[MOST_SPLITS], *top = stack;
     const uint32_t *const memo = w->memo;
-    strip_writer *const strip = &w->strip;
-    cursor c = *at;
     const bool turn = clockwise ^ (c.splits & 1);
     uint32_t leaf[3];
-    size_t count = 1;
-    descend(w, &c, stack);
+    top = descend(w, &c, top);
     leaf_at(w, &c, turn ^ (c.splits & 1), leaf);
-    if (c.depth > 0) {
+    if (top > stack) {
         /* The first leaf: how it was entered, the waiting triangle knows; how it is left, we do. */
         if (strip->waits) strip_say(strip, strip->waiting, leaf);
-        const uint32_t right = memo[c.r] & INDEX, other = memo[c.leaves_by_leg ? c.a : c.l] & INDEX;
-        const uint32_t edge[3] = {right, other, other};
-        strip_say(strip, leaf, edge);
-        uint32_t *restrict s = strip->s + strip->count;
-        uint32_t pivot = s[-2], last = s[-1];
+        const uint32_t right = memo[c.r] & INDEX, other = memo[c.by_leg_out ? c.a : c.l] & INDEX;
+        strip_say(strip, leaf, (const uint32_t[3]){right, other, other});
+        uint32_t *restrict s = strip->s + strip->count, pivot = s[-2];
         for (;;) {
-            take_later(&c, stack);
-            descend(w, &c, stack);
-            count++;
-            if (c.depth == 0) break;
-            const uint32_t a = memo[c.a] & INDEX, l = memo[c.l] & INDEX, r = memo[c.r] & INDEX;
-            const uint32_t through = c.enters_by_leg ? (c.leaves_by_leg ? a : l) : r;
+            take_later(&c, --top);
+            top = descend(w, &c, top);
+            if (top == stack) break;
+            const uint32_t by_leg = choose(c.by_leg_out, c.a, c.l);
+            const uint32_t through = memo[choose(c.by_leg_in, by_leg, c.r)] & INDEX;
             *s = pivot;
             s += pivot == through;
-            last = c.enters_by_leg ? r : a;
-            *s++ = last;
+            *s++ = memo[choose(c.by_leg_in, c.r, c.a)] & INDEX;
             pivot = through;
         }
-        (void)last;
         strip->count = (size_t)(s - strip->s);
-        leaf_at(w, &c, turn ^ (c.splits & 1), leaf);
         strip->waits = false;
+        leaf_at(w, &c, turn ^ (c.splits & 1), leaf);
     }
     /* How the last leaf is left, the next triangle knows. */
     strip_put(strip, leaf);
-    *at = c;
-    return count;
+    return c;
 }
 
 static void walk_plain(walk *w, const half *h) {
@@ -195,15 +194,19 @@ static void walk_plain(walk *w, const half *h) {
     (void)patch_place(w, h->a);
     (void)patch_place(w, h->l);
     (void)patch_place(w, h->r);
-    cursor c = {
-        .a = h->a, .l = h->l, .r = h->r, .splits = h->splits, .next = (uint32_t)patch->vertex_count | FRESH};
+    cursor c = {.a = h->a,
+                .l = h->l,
+                .r = h->r,
+                .splits = (uint32_t)h->splits,
+                .next = (uint32_t)patch->vertex_count | FRESH};
     if (w->query->product == RQT_PRODUCT_TRIANGLES)
-        patch->triangle_count += list_triangles(w, &c, h->clockwise, patch->triangles + 3 * patch->triangle_count);
+        c = list_triangles(w, c, h->clockwise, patch->triangles + 3 * patch->triangle_count);
     else if (w->query->product == RQT_PRODUCT_STRIP)
-        patch->triangle_count += strip_triangles(w, &c, h->clockwise);
+        c = strip_triangles(w, c, h->clockwise, &w->strip);
     else
-        patch->triangle_count += count_triangles(w, &c);
-    patch->vertex_count = c.next & ~FRESH;
+        c = visit_vertices(w, c);
+    patch->triangle_count += (size_t)(c.next / ONE_SPLIT) + 1;
+    patch->vertex_count = (uint32_t)c.next & ~FRESH;
 }
 
 /* ----------------------------------------------------------------------------------------------- with care */

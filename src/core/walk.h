@@ -71,6 +71,7 @@ typedef struct walk {
     rqt_block_place place;
     const rqt_block *block; /* NULL: its summary is enough */
     int n;                  /* vertices a side */
+    uint64_t inverse;       /* place * inverse >> 32 is place / n */
     uint8_t *chosen;        /* n * n: selected? */
     uint32_t *memo;         /* n * n */
     uint32_t live;
