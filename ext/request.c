@@ -74,8 +74,8 @@ int request_read(connection *c, sqlite3_value *region, sqlite3_value *eps, sqlit
     return code;
 }
 
-int request_patch(request *r, rqt_patch *patch, store_reads *reads, char **error) {
-    return store_query(r->store, r->terrain, r->region, r->eps, &r->options, patch, reads, error);
+int request_patch(request *r, rqt_product product, rqt_patch *patch, store_reads *reads, char **error) {
+    return store_query_product(r->store, r->terrain, r->region, r->eps, &r->options, product, patch, reads, error);
 }
 
 void request_free(request *r) {

@@ -129,7 +129,7 @@ static bool find_window(const request *r, const rqt_patch *patch, window *w) {
 
 static int prove(request *r, proof *p, char **error) {
     rqt_patch patch;
-    int code = request_patch(r, &patch, NULL, error);
+    int code = request_patch(r, RQT_PRODUCT_TRIANGLES, &patch, NULL, error);
     if (code != SQLITE_OK) return code;
     window w;
     if (!find_window(r, &patch, &w)) return SQLITE_OK; /* outside the terrain: nothing is claimed */
@@ -167,7 +167,7 @@ static int prove(request *r, proof *p, char **error) {
     sqlite3_free(w.q);
     sqlite3_free(w.valid);
     sqlite3_free(triangles);
-    rqt_patch_free(&patch);
+    store_keep(r->store, &patch);
     return code;
 }
 

@@ -77,7 +77,7 @@ static int mesh_height(store *s, const store_terrain *t, double x, double y, dou
         *metres = metres_of(&t->unit, a->q + wb * ((double)b->q - a->q) + wc * ((double)c->q - a->q));
         *found = true;
     }
-    rqt_patch_free(&patch);
+    store_keep(s, &patch);
     rqt_region_free(region);
     rqt_geometry_free(geometry);
     return code;

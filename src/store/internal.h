@@ -26,6 +26,7 @@ struct store {
     sqlite3_stmt *probe;                /* asks whether we are interrupted */
     int holders;                        /* calls of store_begin that have not ended */
     block_cache *cache;
+    rqt_scratch *scratch; /* memory that queries hand on */
     rqt_codec *codec;
 };
 

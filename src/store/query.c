@@ -118,7 +118,9 @@ static int begin_reads(const rqt_query *query, store_reads *reads) {
         for (int c = 0; c < 4; c++)
             selected += summary->corner[c].error > query->eps ||
                         (query->outline == RQT_OUTLINE_EXACT && (summary->corner[c].flags & RQT_OUTLINE));
-        reads->rows[i] = (store_read){query->answers[i].number, false, false, 0, selected};
+        const bool outside = !rqt_query_needs_block(query, &query->answers[i]) &&
+                             rqt_summary_needs_block(summary, query->outline, query->eps);
+        reads->rows[i] = (store_read){.number = query->answers[i].number, .outside = outside, .selected = selected};
     }
     return SQLITE_OK;
 }
@@ -142,7 +144,11 @@ static const rqt_block *read_block(void *context, rqt_block_number number) {
                 sqlite3_reset(store_statements(r->store, r->terrain)->bytes);
                 if (r->code != SQLITE_OK) return NULL;
             }
-            *row = (store_read){number, true, read == 0, size, count_selected(r->query, block)};
+            *row = (store_read){.number = number,
+                                .needs_bytes = true,
+                                .cached = read == 0,
+                                .bytes = size,
+                                .selected = count_selected(r->query, block)};
         }
     }
     return block;
@@ -167,7 +173,8 @@ void store_reads_free(store_reads *reads) {
 }
 
 static int query(store *s, const store_terrain *t, const rqt_region *region, double eps,
-                 const store_query_options *options, rqt_patch *patch, store_reads *reads, char **error) {
+                 const store_query_options *options, rqt_product product, rqt_patch *patch, store_reads *reads,
+                 char **error) {
     memset(patch, 0, sizeof *patch);
     if (reads) memset(reads, 0, sizeof *reads);
     if (!(eps >= 0)) return store_fail(error, SQLITE_ERROR, "eps must be a number of metres, 0 or more");
@@ -184,6 +191,8 @@ static int query(store *s, const store_terrain *t, const rqt_region *region, dou
                            .eps = code_eps,
                            .select = options->select,
                            .outline = options->outline,
+                           .product = product,
+                           .scratch = s->scratch,
                            .answers = list.rows,
                            .answer_count = list.count,
                            .read_block = read_block,
@@ -206,13 +215,19 @@ static int query(store *s, const store_terrain *t, const rqt_region *region, dou
     return code;
 }
 
-int store_query(store *s, const store_terrain *t, const rqt_region *region, double eps,
-                const store_query_options *options, rqt_patch *patch, store_reads *reads, char **error) {
+int store_query_product(store *s, const store_terrain *t, const rqt_region *region, double eps,
+                        const store_query_options *options, rqt_product product, rqt_patch *patch,
+                        store_reads *reads, char **error) {
     memset(patch, 0, sizeof *patch);
     if (reads) memset(reads, 0, sizeof *reads);
     int code = store_begin_on(s, t, error);
     if (code != SQLITE_OK) return code;
-    code = query(s, t, region, eps, options, patch, reads, error);
+    code = query(s, t, region, eps, options, product, patch, reads, error);
     store_end(s);
     return code;
+}
+
+int store_query(store *s, const store_terrain *t, const rqt_region *region, double eps,
+                const store_query_options *options, rqt_patch *patch, store_reads *reads, char **error) {
+    return store_query_product(s, t, region, eps, options, RQT_PRODUCT_TRIANGLES, patch, reads, error);
 }

@@ -80,6 +80,7 @@ typedef struct store_query_options {
 typedef struct store_read {
     rqt_block_number number;
     bool needs_bytes; /* false: answered from its index row alone */
+    bool outside;     /* its cell only touches the region: nothing in it is asked for */
     bool cached;      /* its decoded bytes were in the cache */
     int64_t bytes;    /* of the BLOB, read now or before; 0 when not needed */
     int64_t selected; /* vertices of its grid that eps selects, corners of the block included */
@@ -93,6 +94,12 @@ void store_reads_free(store_reads *reads);
 /* The patch of region at eps (metres; checked here: NaN and negative are SQLITE_ERROR). reads may be NULL. */
 int store_query(store *s, const store_terrain *t, const rqt_region *region, double eps,
                 const store_query_options *options, rqt_patch *patch, store_reads *reads, char **error);
+/* The same, with a patch that holds only what is asked for, in memory that earlier patches have left. */
+int store_query_product(store *s, const store_terrain *t, const rqt_region *region, double eps,
+                        const store_query_options *options, rqt_product product, rqt_patch *patch,
+                        store_reads *reads, char **error);
+/* Instead of rqt_patch_free: the store keeps the memory for its next query, up to a limit. */
+void store_keep(store *s, rqt_patch *patch);
 /* Full-resolution samples of a window inside the raster, for width*height values each, row by row. */
 int store_window(store *s, const store_terrain *t, int32_t col, int32_t row, int32_t width, int32_t height,
                  int32_t *q, uint8_t *valid, char **error);
