@@ -496,6 +496,21 @@ bool rqt_query_needs_block(const rqt_query *query, const rqt_answer *answer);
 /* The patch of a query (mode `cover`): each kept leaf that belongs to the region, once. */
 rqt_status rqt_query_run(rqt_query *query, const rqt_allocator *allocator, rqt_patch *patch);
 
+/* The leaf that a point lies inside, without a patch. */
+typedef enum rqt_found {
+    RQT_FOUND_LEAF,    /* that one, and none else of the mesh */
+    RQT_FOUND_NOTHING, /* the point is in no kept leaf */
+    RQT_FOUND_UNSURE   /* on an edge, at the raster's end, or somewhere else: make the patch of the point */
+} rqt_found;
+typedef struct rqt_leaf_corner {
+    int32_t col, row, q;
+} rqt_leaf_corner;
+/* x, y: the point in 2^-20 samples. answer: a block that answers the query (lattice, k, eps, select, outline are
+ * read) and holds the point; block: its bytes, decoded, or NULL where rqt_summary_needs_block says no. leaf: the
+ * corners as the patch of the point has them, in its order. */
+rqt_found rqt_query_leaf_at(const rqt_query *query, const rqt_answer *answer, const rqt_block *block, int64_t x,
+                            int64_t y, rqt_leaf_corner leaf[3]);
+
 /* One generalized strip of a patch: n indices; triangle i is (s[i], s[i+1], s[i+2]), its last two swapped for odd
  * i, counter-clockwise; a triangle with two equal vertices is a join. An empty patch gives n = 0.
  * Release with allocator->resize(context, strip, 0). */

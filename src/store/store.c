@@ -58,6 +58,7 @@ static void finalize(statements *p) {
     sqlite3_finalize(p->answers[0]);
     sqlite3_finalize(p->answers[1]);
     sqlite3_finalize(p->bytes);
+    sqlite3_finalize(p->summary);
     memset(p, 0, sizeof *p);
 }
 
@@ -85,6 +86,8 @@ static void forget(store *s) {
     s->count = 0;
     s->known = false;
     block_cache_clear(s->cache);
+    if (s->has_summaries) memset(s->summaries, 0, SUMMARY_PLACES * sizeof *s->summaries);
+    s->has_summaries = false;
 }
 
 void store_close(store *s) {
@@ -94,6 +97,7 @@ void store_close(store *s) {
     block_cache_free(s->cache);
     rqt_codec_free(s->codec);
     rqt_scratch_free(s->scratch);
+    sqlite3_free(s->summaries);
     sqlite3_free(s);
 }
 
