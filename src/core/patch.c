@@ -156,9 +156,10 @@ void patch_end(walk *w, rqt_status status) {
 
 /* ------------------------------------------------------------------------------------------- shared vertices */
 
+/* The topmost bits of the product: those below do not depend on the row. size is a power of two. */
 static size_t table_slot(int32_t col, int32_t row, size_t size) {
     const uint64_t h = ((uint64_t)(uint32_t)row << 32 | (uint32_t)col) * UINT64_C(0x9E3779B97F4A7C15);
-    return (size_t)(h >> 24) & (size - 1);
+    return (size_t)(h >> (__builtin_clzll(size) + 1));
 }
 
 /* The entry of a sample, or the free one where it belongs; looks from `slot` on. */
@@ -225,37 +226,41 @@ static rqt_vertex place_vertex(const walk *w, uint32_t place) {
     return (rqt_vertex){w->place.x + u * w->place.stride, w->place.y + v * w->place.stride};
 }
 
-/* Look up what is selected on the border: the vertices that the patch holds go into the memo. */
+/* Look up what is selected on the border: the vertices that the patch holds go into the memo. Blocks come in Morton
+ * order, so the neighbours to the east and to the south have not been walked yet, and but for the corners what lies
+ * there is new. */
 static void look_up_border(walk *w) {
     rqt_scratch *s = w->scratch;
+    const uint8_t *const chosen = w->chosen;
     const uint32_t n = (uint32_t)w->n, last = n - 1, corners[4] = {0, last, last * n, last * n + last};
     border_vertex *border = s->border;
-    size_t count = 0, kept = 0;
-    for (int c = 0; c < 4; c++) border[count++].place = corners[c];
+    size_t old = 4, count;
+    for (size_t c = 0; c < 4; c++) border[c].place = corners[c];
     for (uint32_t i = 1; i < last; i++) {
-        const uint32_t at[4] = {i, last * n + i, i * n, i * n + last};
-        for (int c = 0; c < 4; c++) {
-            border[count].place = at[c];
-            count += w->chosen[at[c]];
-        }
+        border[old].place = i;
+        old += chosen[i];
+        border[old].place = i * n;
+        old += chosen[i * n];
+    }
+    count = old;
+    for (uint32_t i = 1; i < last; i++) {
+        border[count].place = last * n + i;
+        count += chosen[last * n + i];
+        border[count].place = i * n + last;
+        count += chosen[i * n + last];
     }
     for (size_t b = 0; b < count; b++) { /* the table is large and lies all over memory */
         const rqt_vertex at = place_vertex(w, border[b].place);
         border[b].slot = table_slot(at.x, at.y, s->table_size);
         __builtin_prefetch(&s->table[border[b].slot]);
     }
-    for (size_t b = 0; b < count; b++) {
+    for (size_t b = 0; b < old; b++) {
         const uint32_t place = border[b].place;
         const rqt_vertex at = place_vertex(w, place);
         const shared_vertex *v = table_find(w, border[b].slot, at.x, at.y);
-        if (v->stamp == s->stamp) {
-            w->memo[place] = v->index | KNOWN;
-        } else {
-            w->memo[place] = 0;
-            border[kept++] = (border_vertex){place, (size_t)(v - s->table)};
-        }
+        w->memo[place] = v->stamp == s->stamp ? v->index | KNOWN : 0;
     }
-    w->border_count = kept;
+    w->border_count = count;
 }
 
 static void forget_memo(walk *w) {
@@ -300,7 +305,7 @@ void patch_leave_block(walk *w) {
     const border_vertex *border = w->scratch->border;
     for (size_t b = 0; b < w->border_count; b++) {
         const uint32_t memo = w->memo[border[b].place];
-        if (memo < w->live) continue;
+        if (memo < w->live || memo >= KNOWN) continue;
         const rqt_patch_vertex *v = &w->patch->vertices[memo & INDEX];
         table_enter(w, table_find(w, border[b].slot, v->col, v->row), v->col, v->row, memo & INDEX);
     }

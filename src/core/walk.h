@@ -33,7 +33,7 @@ typedef struct shared_vertex {
     uint32_t index, stamp;
 } shared_vertex;
 
-/* A vertex of the block's border that the patch does not hold yet, and where in the table it would be. */
+/* A selected vertex of the block's border, and where the table is searched for it. */
 typedef struct border_vertex {
     uint32_t place;
     size_t slot;
