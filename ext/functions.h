@@ -78,9 +78,8 @@ typedef struct request {
 
 int request_read(connection *c, sqlite3_value *region, sqlite3_value *eps, sqlite3_value *terrain,
                  sqlite3_value *options, request *out, char **error);
-int request_patch(request *r, rqt_patch *patch, store_reads *reads, char **error);
-/* The strip that the options want. */
-int request_strip(const request *r, const rqt_patch *patch, uint32_t **strip, size_t *n);
+/* A patch with what the product needs; of strips, the one that the options want. Give it back with store_keep. */
+int request_patch(request *r, rqt_product product, rqt_patch *patch, store_reads *reads, char **error);
 void request_free(request *r);
 /* The terrain that a value names; NULL value: the only one. */
 int request_terrain(store *s, sqlite3_value *name, const store_terrain **terrain, char **error);

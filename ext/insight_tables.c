@@ -181,6 +181,7 @@ static void explain_column(void *data, size_t row, int column, sqlite3_context *
                      : "answers eps; made in memory, for the metric is not stored; nothing is selected inside");
         else
             text(result, read->needs_bytes ? "answers eps; its centre is selected, so its bytes are walked"
+                         : read->outside   ? "answers eps; it only touches the region, so its index row is enough"
                                            : "answers eps; nothing is selected inside, so its index row is enough");
         break;
     case 3:
@@ -210,10 +211,10 @@ int fill_explain(connection *c, sqlite3_value **arguments, row_set *rows, char *
     rqt_patch patch = {0};
     if (e) {
         *e = (explanation){.lattice = r.terrain->lattice, .k = r.terrain->k, .placement = r.terrain->placement};
-        code = request_patch(&r, &patch, &e->reads, error);
+        code = request_patch(&r, RQT_PRODUCT_VERTICES, &patch, &e->reads, error);
         e->achieved_eps = r.achieved_eps;
     }
-    rqt_patch_free(&patch);
+    if (r.store) store_keep(r.store, &patch);
     request_free(&r);
     if (code != SQLITE_OK) {
         sqlite3_free(e);

@@ -75,16 +75,17 @@ int request_read(connection *c, sqlite3_value *region, sqlite3_value *eps, sqlit
     return code;
 }
 
-int request_patch(request *r, rqt_patch *patch, store_reads *reads, char **error) {
-    if (r->max_vertices == 0)
-        return store_query(r->store, r->terrain, r->region, r->eps, &r->options, patch, reads, error);
-    return store_query_within(r->store, r->terrain, r->region, r->eps, &r->options, r->max_vertices,
-                              &r->achieved_eps, patch, reads, error);
-}
-
-int request_strip(const request *r, const rqt_patch *patch, uint32_t **strip, size_t *n) {
-    const rqt_status status = r->fans ? rqt_strip_build_fans(patch, store_allocator(), strip, n)
-                                      : rqt_strip_build(patch, store_allocator(), strip, n);
+int request_patch(request *r, rqt_product product, rqt_patch *patch, store_reads *reads, char **error) {
+    const bool fans = r->fans && product == RQT_PRODUCT_STRIP;
+    r->options.product = fans ? RQT_PRODUCT_TRIANGLES : product;
+    r->options.wants_leaves = fans;
+    int code = r->max_vertices == 0
+                   ? store_query(r->store, r->terrain, r->region, r->eps, &r->options, patch, reads, error)
+                   : store_query_within(r->store, r->terrain, r->region, r->eps, &r->options, r->max_vertices,
+                                        &r->achieved_eps, patch, reads, error);
+    if (code != SQLITE_OK || !fans) return code;
+    const rqt_status status = rqt_strip_build_fans(patch, store_allocator(), &patch->strip, &patch->strip_count);
+    patch->strip_capacity = patch->strip_count;
     return status == RQT_OK ? SQLITE_OK : SQLITE_NOMEM;
 }
 

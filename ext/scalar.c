@@ -108,12 +108,10 @@ void call_circle(sqlite3_context *result, int count, sqlite3_value **arguments) 
 
 static int own_format(const request *r, const rqt_patch *patch, rqt_mesh_kind kind, uint8_t **bytes, size_t *size,
                       char **error) {
-    uint32_t *strip = NULL;
-    size_t indices = 3 * patch->triangle_count;
-    if (kind == RQT_MESH_STRIP && request_strip(r, patch, &strip, &indices) != SQLITE_OK) return SQLITE_NOMEM;
+    const bool strip = kind == RQT_MESH_STRIP;
     const rqt_mesh_header header = {.kind = kind,
                                     .vertex_count = patch->vertex_count,
-                                    .index_count = indices,
+                                    .index_count = strip ? patch->strip_count : 3 * patch->triangle_count,
                                     .placement = r->terrain->placement,
                                     .unit = r->terrain->unit,
                                     .eps = r->achieved_eps,
@@ -126,8 +124,7 @@ static int own_format(const request *r, const rqt_patch *patch, rqt_mesh_kind ki
         *bytes = sqlite3_malloc64(*size);
     if (code == SQLITE_OK && !*bytes) code = SQLITE_NOMEM;
     if (code == SQLITE_OK)
-        rqt_mesh_encode(&header, patch->vertices, kind == RQT_MESH_STRIP ? strip : patch->triangles, *bytes);
-    sqlite3_free(strip);
+        rqt_mesh_encode(&header, patch->vertices, strip ? patch->strip : patch->triangles, *bytes);
     return code;
 }
 
@@ -164,11 +161,12 @@ void call_mesh(sqlite3_context *result, int count, sqlite3_value **arguments) {
     if (code == SQLITE_OK)
         code = request_read(c, arguments[0], arguments[1], count > 3 ? arguments[3] : NULL,
                             count > 4 ? arguments[4] : NULL, &r, &error);
-    if (code == SQLITE_OK) code = request_patch(&r, &patch, NULL, &error);
+    if (code == SQLITE_OK)
+        code = request_patch(&r, strip ? RQT_PRODUCT_STRIP : RQT_PRODUCT_TRIANGLES, &patch, NULL, &error);
     if (code == SQLITE_OK)
         code = other ? other_format(&r, &patch, kind, &bytes, &size, &error)
                      : own_format(&r, &patch, strip ? RQT_MESH_STRIP : RQT_MESH_INDEXED, &bytes, &size, &error);
-    rqt_patch_free(&patch);
+    if (r.store) store_keep(r.store, &patch);
     request_free(&r);
     if (code != SQLITE_OK)
         scalar_error(result, "rqt_mesh", code, error);

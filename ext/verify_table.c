@@ -133,7 +133,7 @@ static bool find_window(const request *r, const rqt_patch *patch, window *w) {
 
 static int prove(request *r, proof *p, char **error) {
     rqt_patch patch;
-    int code = request_patch(r, &patch, NULL, error);
+    int code = request_patch(r, RQT_PRODUCT_TRIANGLES, &patch, NULL, error);
     if (code != SQLITE_OK) return code;
     p->achieved_eps = r->achieved_eps;
     window w;
@@ -172,7 +172,7 @@ static int prove(request *r, proof *p, char **error) {
     sqlite3_free(w.q);
     sqlite3_free(w.valid);
     sqlite3_free(triangles);
-    rqt_patch_free(&patch);
+    store_keep(r->store, &patch);
     return code;
 }
 

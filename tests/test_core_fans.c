@@ -140,7 +140,11 @@ static void an_empty_patch_has_no_fans_and_a_patch_needs_leaves(void **state) {
     rqt_patch_vertex vertices[3] = {{.col = 0, .row = 0}, {.col = 1, .row = 0}, {.col = 0, .row = 1}};
     uint32_t triangle[3] = {0, 2, 1}, *strip;
     size_t n;
-    p = (rqt_patch){vertices, 3, triangle, 1, NULL, test_allocator};
+    p = (rqt_patch){.vertices = vertices,
+                    .vertex_count = 3,
+                    .triangles = triangle,
+                    .triangle_count = 1,
+                    .allocator = test_allocator};
     assert_int_equal(rqt_strip_build_fans(&p, &test_allocator, &strip, &n), RQT_INVALID);
     assert_true(!strip && n == 0);
 }
@@ -158,7 +162,12 @@ static void eight_triangles_round_a_centre_are_the_papers_sequence(void **state)
         triangles[3 * i] = 0, triangles[3 * i + 1] = i + 1, triangles[3 * i + 2] = (i + 1) % 8 + 1;
         leaves[i] = (rqt_triangle){{1, 1}, {rim[i][0], rim[i][1]}, {rim[(i + 1) % 8][0], rim[(i + 1) % 8][1]}};
     }
-    rqt_patch p = {vertices, 9, triangles, 8, leaves, test_allocator};
+    rqt_patch p = {.vertices = vertices,
+                   .vertex_count = 9,
+                   .triangles = triangles,
+                   .triangle_count = 8,
+                   .leaves = leaves,
+                   .allocator = test_allocator};
     assert_int_equal(rqt_strip_build_fans(&p, &test_allocator, &strip, &n), RQT_OK);
     static const uint32_t expected[] = {1, 2, 0, 3, 0, 4, 0, 5, 0, 6, 0, 7, 0, 8, 1};
     assert_int_equal(n, sizeof expected / sizeof *expected);

@@ -489,6 +489,9 @@ typedef struct rqt_patch {
     size_t triangle_count;
     rqt_triangle *leaves; /* NULL unless the query asked: the same triangles by lattice vertices, unclamped */
     rqt_allocator allocator;
+    uint32_t *strip; /* NULL unless the query asked: what rqt_strip_build makes of the triangles */
+    size_t strip_count;
+    size_t vertex_capacity, triangle_capacity, leaf_capacity, strip_capacity; /* elements there is room for */
 } rqt_patch;
 
 void rqt_patch_free(rqt_patch *patch);
@@ -501,6 +504,18 @@ typedef struct rqt_answer { /* a block of the index that answers eps and whose e
     rqt_summary summary;
 } rqt_answer;
 
+/* What a patch is to hold beside its vertices. triangle_count is told in any case. */
+typedef enum rqt_product { RQT_PRODUCT_TRIANGLES, RQT_PRODUCT_STRIP, RQT_PRODUCT_VERTICES } rqt_product;
+
+/* Memory that one query leaves to the next, so that not every query has to ask for it and touch it anew. For one
+ * thread. */
+typedef struct rqt_scratch rqt_scratch;
+rqt_status rqt_scratch_create(const rqt_allocator *allocator, rqt_scratch **scratch);
+void rqt_scratch_free(rqt_scratch *scratch);
+/* Instead of rqt_patch_free: the patch's memory goes to the next query. What is kept is at most `limit` bytes, the
+ * rest is released. */
+void rqt_scratch_keep(rqt_scratch *scratch, rqt_patch *patch, size_t limit);
+
 typedef struct rqt_query {
     rqt_lattice lattice;
     int k;
@@ -508,8 +523,10 @@ typedef struct rqt_query {
     rqt_code eps;
     rqt_select select;
     rqt_outline outline;
-    bool wants_leaves;   /* fill patch->leaves */
-    rqt_answer *answers; /* in any order; sorted into Morton order by the query */
+    rqt_product product;
+    bool wants_leaves;    /* fill patch->leaves; with RQT_PRODUCT_TRIANGLES only */
+    rqt_scratch *scratch; /* NULL: none; made with the same allocator as the query is run with */
+    rqt_answer *answers;  /* in any order; sorted into Morton order by the query */
     size_t answer_count;
     /* The decoded block of a number, valid until the next call. NULL: the query stops with RQT_READ_FAILED. */
     const rqt_block *(*read_block)(void *context, rqt_block_number number);
@@ -521,8 +538,26 @@ typedef struct rqt_query {
 bool rqt_summary_answers(const rqt_summary *summary, rqt_outline outline, rqt_code eps);
 /* Does the query need this block's bytes, or is its summary enough? */
 bool rqt_summary_needs_block(const rqt_summary *summary, rqt_outline outline, rqt_code eps);
+/* Does this query need an answer's bytes? Not where the summary is enough, nor where the block only touches the
+ * region. Queries that close their selection (rqt_select) look at all that summaries leave open. */
+bool rqt_query_needs_block(const rqt_query *query, const rqt_answer *answer);
 /* The patch of a query (mode `cover`): each kept leaf that belongs to the region, once. */
 rqt_status rqt_query_run(rqt_query *query, const rqt_allocator *allocator, rqt_patch *patch);
+
+/* The leaf that a point lies inside, without a patch. */
+typedef enum rqt_found {
+    RQT_FOUND_LEAF,    /* that one, and none else of the mesh */
+    RQT_FOUND_NOTHING, /* the point is in no kept leaf */
+    RQT_FOUND_UNSURE   /* on an edge, at the raster's end, or somewhere else: make the patch of the point */
+} rqt_found;
+typedef struct rqt_leaf_corner {
+    int32_t col, row, q;
+} rqt_leaf_corner;
+/* x, y: the point in 2^-20 samples. answer: a block that answers the query (lattice, k, eps, select, outline are
+ * read) and holds the point; block: its bytes, decoded, or NULL where rqt_summary_needs_block says no. leaf: the
+ * corners as the patch of the point has them, in its order. */
+rqt_found rqt_query_leaf_at(const rqt_query *query, const rqt_answer *answer, const rqt_block *block, int64_t x,
+                            int64_t y, rqt_leaf_corner leaf[3]);
 
 /* One generalized strip of a patch: n indices; triangle i is (s[i], s[i+1], s[i+2]), its last two swapped for odd
  * i, counter-clockwise; a triangle with two equal vertices is a join. An empty patch gives n = 0.

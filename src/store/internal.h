@@ -12,8 +12,16 @@
 
 typedef struct statements {
     sqlite3_stmt *answers[2]; /* by rqt_outline */
-    sqlite3_stmt *bytes;
+    sqlite3_stmt *bytes, *summary;
 } statements;
+
+/* Summaries by block number, as many as a terrain of 8193 x 8193 has at k = 6; what hits the same place goes. */
+#define SUMMARY_PLACES 16384
+typedef struct kept_summary {
+    uint64_t terrain; /* + 1; 0: nothing is here */
+    rqt_block_number number;
+    rqt_summary summary;
+} kept_summary;
 
 struct store {
     sqlite3 *db;
@@ -26,6 +34,9 @@ struct store {
     sqlite3_stmt *probe;                /* asks whether we are interrupted */
     int holders;                        /* calls of store_begin that have not ended */
     block_cache *cache;
+    rqt_scratch *scratch;    /* memory that queries hand on */
+    kept_summary *summaries; /* SUMMARY_PLACES, from the first use on */
+    bool has_summaries;      /* there is something in them */
     rqt_codec *codec;
     struct method_cache *methods; /* what was computed, for one terrain; NULL: nothing */
     size_t method_memory;
@@ -55,6 +66,9 @@ int store_prepare(store *s, const store_terrain *t, sqlite3_stmt **out, char *sq
 
 /* The bytes of a block; valid until its statement is reset. blocks.c */
 int store_block_bytes(store *s, const store_terrain *t, rqt_block_number number, const uint8_t **bytes, int *size,
+                      char **error);
+/* The summary of one block, kept. Valid until the next call. blocks.c */
+int store_get_summary(store *s, const store_terrain *t, rqt_block_number number, const rqt_summary **summary,
                       char **error);
 /* The decoded block, from the cache or the database. *read: bytes read now, 0 when it was cached. blocks.c */
 int store_get_block(store *s, const store_terrain *t, rqt_block_number number, const rqt_block **block, int *read,

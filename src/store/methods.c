@@ -313,6 +313,8 @@ int store_query_computed(store *s, const store_terrain *t, store_question *quest
                        .select = options->select,
                        .outline = options->outline,
                        .wants_leaves = options->wants_leaves,
+                       .product = options->product,
+                       .scratch = s->scratch,
                        .answers = answers,
                        .answer_count = find_answers(m, t, box, options->outline, question->eps, answers),
                        .read_block = make_block,

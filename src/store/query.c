@@ -120,7 +120,9 @@ int store_begin_reads(const rqt_query *query, store_reads *reads) {
         for (int c = 0; c < 4; c++)
             selected += summary->corner[c].error > query->eps ||
                         (query->outline == RQT_OUTLINE_EXACT && (summary->corner[c].flags & RQT_OUTLINE));
-        reads->rows[i] = (store_read){.number = query->answers[i].number, .selected = selected};
+        const bool outside = !rqt_query_needs_block(query, &query->answers[i]) &&
+                             rqt_summary_needs_block(summary, query->outline, query->eps);
+        reads->rows[i] = (store_read){.number = query->answers[i].number, .outside = outside, .selected = selected};
     }
     return SQLITE_OK;
 }
@@ -197,6 +199,8 @@ int store_query_tables(store *s, const store_terrain *t, store_question *questio
                            .select = options->select,
                            .outline = options->outline,
                            .wants_leaves = options->wants_leaves,
+                           .product = options->product,
+                           .scratch = s->scratch,
                            .answers = list.rows,
                            .answer_count = list.count,
                            .read_block = read_block,

@@ -75,8 +75,9 @@ void store_terrains_free(store_terrain *terrains, int count);
 typedef struct store_query_options {
     rqt_select select;
     rqt_outline outline;
-    rqt_metric metric; /* exact is what is stored; minimal may be; the others are computed, see methods.c */
-    bool wants_leaves; /* fill patch->leaves */
+    rqt_metric metric;   /* exact is what is stored; minimal may be; the others are computed, see methods.c */
+    rqt_product product; /* what the patch holds */
+    bool wants_leaves;   /* fill patch->leaves; with RQT_PRODUCT_TRIANGLES only */
 } store_query_options;
 
 /* One row per block that answered, in Morton order. */
@@ -84,6 +85,7 @@ typedef struct store_read {
     rqt_block_number number;
     bool needs_bytes; /* false: answered from its index row alone */
     bool computed;    /* not stored: made in memory from the heights of the whole terrain */
+    bool outside;     /* its cell only touches the region: nothing in it is asked for */
     bool cached;      /* its decoded bytes were in the cache */
     int64_t bytes;    /* of the BLOB, read now or before; 0 when not needed */
     int64_t selected; /* vertices of its grid that eps selects, corners of the block included */
@@ -103,6 +105,8 @@ int store_query(store *s, const store_terrain *t, const rqt_region *region, doub
 int store_query_within(store *s, const store_terrain *t, const rqt_region *region, double eps,
                        const store_query_options *options, int64_t max_vertices, double *achieved, rqt_patch *patch,
                        store_reads *reads, char **error);
+/* Instead of rqt_patch_free: the store keeps the memory for its next query, up to a limit. */
+void store_keep(store *s, rqt_patch *patch);
 /* Memory that a metric which is not stored may take, heights included. */
 #define STORE_METHOD_MEMORY ((size_t)512 << 20)
 void store_limit_methods(store *s, size_t bytes);
