@@ -152,7 +152,7 @@ static uint64_t visit_regular(solver *s, const rqt_triangle *t, rqt_vertex split
         number = midpoint_distance(&s->field, t, split);
         if (s->metric == RQT_METRIC_WEDGIE) number += children;
     } else {
-        number = plane_deviation(&s->field, t, &shift);
+        number = regular_deviation(&s->field, t, &shift);
     }
     rqt_code code;
     if (s->metric == RQT_METRIC_EUCLID) {
@@ -272,7 +272,8 @@ rqt_status rqt_metric_compute(const rqt_grid *grid, const rqt_unit *unit, const 
                           .q = grid->q,
                           .valid = grid->valid,
                           .cost = *cost,
-                          .relief = relief_of(grid)},
+                          .relief = relief_of(grid),
+                          .kernels = error_kernels_best()},
                 .metric = metric,
                 .mixed_is_infinite = outline == RQT_OUTLINE_EXACT,
                 .errors = closed,
