@@ -99,7 +99,7 @@ static inline __attribute__((always_inline)) later *descend(const walk *w, curso
     const uint32_t live = w->live, first = (uint32_t)w->first | FRESH;
     for (;;) {
         const uint32_t m = (c->l + c->r) / 2;
-        if (c->splits == 0 || !chosen[m]) return top;
+        if (!(chosen[m] & (uint8_t)(c->splits != 0))) return top;
         const uint32_t left = memo[m], next = (uint32_t)c->next;
         const bool fresh = left < live;
         memo[m] = fresh ? next : left;
