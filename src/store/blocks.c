@@ -12,10 +12,11 @@ int store_block_bytes(store *s, const store_terrain *t, rqt_block_number number,
     *bytes = NULL;
     *size = 0;
     if (!*kept) {
-        const int code = store_prepare(
-            s, t, kept,
-            sqlite3_mprintf("SELECT data FROM \"%w\".rqt_block_%lld%s WHERE id = ?1", t->schema, t->id, t->suffix),
-            error);
+        const int code =
+            store_prepare(s, t, kept,
+                          sqlite3_mprintf("SELECT data, summary FROM \"%w\".rqt_block_%lld%s WHERE id = ?1",
+                                          t->schema, t->id, t->suffix),
+                          error);
         if (code != SQLITE_OK) return code;
     }
     sqlite3_reset(*kept);
@@ -52,9 +53,10 @@ int store_get_summary(store *s, const store_terrain *t, rqt_block_number number,
     sqlite3_stmt **row = &store_statements(s, t)->summary;
     int code = SQLITE_OK;
     if (!*row)
-        code = store_prepare(
-            s, t, row, sqlite3_mprintf("SELECT summary FROM \"%w\".rqt_block_%lld WHERE id = ?1", t->schema, t->id),
-            error);
+        code = store_prepare(s, t, row,
+                             sqlite3_mprintf("SELECT summary FROM \"%w\".rqt_block_%lld%s WHERE id = ?1", t->schema,
+                                             t->id, t->suffix),
+                             error);
     if (code != SQLITE_OK) return code;
     sqlite3_bind_int64(*row, 1, (sqlite3_int64)number);
     code = sqlite3_step(*row);
@@ -80,6 +82,16 @@ int store_get_summary(store *s, const store_terrain *t, rqt_block_number number,
     }
     sqlite3_reset(*row);
     return code;
+}
+
+/* What the block at hand in the statement lacks, out of its summary. */
+static rqt_status set_corners(sqlite3_stmt *row, rqt_block *block) {
+    rqt_summary summary;
+    const void *bytes = sqlite3_column_blob(row, 1);
+    const rqt_status status =
+        bytes ? rqt_summary_decode(bytes, (size_t)sqlite3_column_bytes(row, 1), &summary) : RQT_CORRUPT;
+    if (status == RQT_OK) rqt_block_set_corners(block, &summary);
+    return status;
 }
 
 int store_get_block(store *s, const store_terrain *t, rqt_block_number number, const rqt_block **block, int *read,
@@ -111,6 +123,9 @@ int store_get_block(store *s, const store_terrain *t, rqt_block_number number, c
         else if (status != RQT_OK)
             code = store_fail(error, SQLITE_CORRUPT_VTAB,
                               "terrain %s is damaged: block %llu: its bytes do not decode", t->name, number);
+        else if (set_corners(store_statements(s, t)->bytes, fresh) != RQT_OK)
+            code = store_fail(error, SQLITE_CORRUPT_VTAB, "terrain %s is damaged: the summary of block %llu",
+                              t->name, number);
         if (code != SQLITE_OK && fresh) block_cache_forget(s->cache, key, number);
     }
     sqlite3_reset(store_statements(s, t)->bytes);

@@ -6,6 +6,9 @@
  * must be. Two scans of ids find rows that no cell demands, and sums over the walk are held against the terrain's
  * row. Memory: one block per level and the cache, whatever the terrain's size.
  *
+ * A block of stride > 1 holds its kept vertices only, and its corners' errors come from its summary. Where two
+ * blocks share a vertex that one of them does not keep, the other's must be one that may be dropped there.
+ *
  * A finding is told once, where it is: what cannot be read is not compared, and em is recomputed from the grids
  * below, never from what the children's summaries claim. A read transaction is held throughout, so a writer beside
  * us causes no findings.
@@ -130,13 +133,47 @@ typedef struct run {
     int32_t u, v, du, dv;
 } run;
 
+/* A vertex of which the block holds everything. */
+static bool is_kept(const rqt_block *b, size_t i) {
+    const size_t n = ((size_t)1 << b->k) + 1, last = n - 1;
+    return !b->sparse || b->error[i] > b->floor || b->flags[i] & RQT_OUTLINE ||
+           (i % n % last == 0 && i / n % last == 0);
+}
+
+static bool is_root_corner(const rqt_lattice *lattice, rqt_vertex v) {
+    const int32_t side = 1 << lattice->K;
+    return (v.x == 0 || v.x == side) && (v.y == 0 || v.y == side);
+}
+
+static bool is_sample(const rqt_lattice *lattice, rqt_vertex v) {
+    return v.x < lattice->width && v.y < lattice->height;
+}
+
+/* Has a triangle with this vertex for a corner an area? They all lie within the largest power of two that divides
+ * both coordinates. Vertices without one, past the raster, have no error of their own. */
+static bool has_area(const rqt_lattice *lattice, rqt_vertex v) {
+    if (is_sample(lattice, v)) return true;
+    int32_t reach = 1;
+    while (reach < 1 << lattice->K && v.x % (2 * reach) == 0 && v.y % (2 * reach) == 0) reach *= 2;
+    return is_root_corner(lattice, v) || (v.x - reach < lattice->width - 1 && v.y - reach < lattice->height - 1);
+}
+
 /* n vertices of the frame's block (run a) beside those of another. Heights count where there are any. */
-static void compare(const frame *f, run a, run b, int32_t n, difference *d) {
+static void compare(const check *c, const frame *f, run a, run b, int32_t n, difference *d) {
     const int32_t side = (1 << f->block.k) + 1;
     for (int32_t i = 0; i < n; i++) {
         const int32_t u = a.u + i * a.du, v = a.v + i * a.dv;
         const size_t p = (size_t)(v * side + u), q = (size_t)((b.v + i * b.dv) * side + b.u + i * b.du);
         const rqt_vertex at = {f->place.x + u * f->place.stride, f->place.y + v * f->place.stride};
+        if (!has_area(&c->t->lattice, at)) continue;
+        const bool kept = is_kept(a.block, p), kept_there = is_kept(b.block, q);
+        if (!kept || !kept_there) {
+            const rqt_code floor = kept ? b.block->floor : a.block->floor;
+            const rqt_code error = kept ? a.block->error[p] : b.block->error[q];
+            if ((kept || kept_there) && error > floor) count(&d->errors, at);
+            if ((kept ? a.block->flags[p] : b.block->flags[q]) & RQT_OUTLINE) count(&d->flags, at);
+            continue;
+        }
         if (a.block->flags[p] != b.block->flags[q]) count(&d->flags, at);
         if (a.block->error[p] != b.block->error[q]) count(&d->errors, at);
         if ((a.block->flags[p] & b.block->flags[q] & RQT_VALID) && a.block->q[p] != b.block->q[q])
@@ -146,9 +183,10 @@ static void compare(const frame *f, run a, run b, int32_t n, difference *d) {
 
 /* --------------------------------------------------------------------------------------------- reading blocks */
 
-/* Decode a block's bytes into the cache; NULL when they are not that block's. say: and tell why. */
-static const rqt_block *decode(check *c, rqt_block_number number, const rqt_block_place *place, const void *bytes,
-                               size_t size, bool say) {
+/* Decode a block's bytes into the cache, with its corners from its summary; NULL when they are not that block's.
+ * say: and tell why. */
+static const rqt_block *decode(check *c, rqt_block_number number, const rqt_block_place *place,
+                               const rqt_summary *summary, const void *bytes, size_t size, bool say) {
     rqt_block_header header;
     rqt_message why = {""};
     if (rqt_block_info(bytes, size, &header, &why) != RQT_OK) {
@@ -161,12 +199,21 @@ static const rqt_block *decode(check *c, rqt_block_number number, const rqt_bloc
                   header.width, header.height, c->t->k, place->width, place->height);
         return NULL;
     }
+    if (header.sparse != (place->stride > 1)) {
+        if (say)
+            FOUND(c, number, "does not fit its place: it keeps %s",
+                  header.sparse ? "some vertices" : "all vertices");
+        return NULL;
+    }
+    if (say && header.sparse && header.floor != summary->tol.em)
+        FOUND(c, number, "has the floor %d, and em %d in its summary", header.floor, summary->tol.em);
     if (say && header.quantum != c->quantum)
         FOUND(c, number, "has the height quantum %.17g, the terrain has %.17g", header.quantum, c->quantum);
     const rqt_block *block = block_cache_find(c->cache, 0, number);
     if (block) return block;
     rqt_block *fresh = block_cache_add(c->cache, 0, number, c->t->k);
     const rqt_status status = fresh ? rqt_block_decode(c->codec, bytes, size, fresh) : RQT_NO_MEMORY;
+    if (status == RQT_OK) rqt_block_set_corners(fresh, summary);
     if (status == RQT_OK) return fresh;
     if (fresh) block_cache_forget(c->cache, 0, number);
     if (status == RQT_NO_MEMORY) {
@@ -207,12 +254,15 @@ static void read_frame(check *c, frame *f) {
         f->has_summary = bytes && rqt_summary_decode(bytes, size, &f->summary) == RQT_OK;
         if (!f->has_summary) FOUND(c, f->number, "has a damaged summary: its %d bytes do not decode", (int)size);
         bytes = column_bytes(c, 1, &size);
-        const rqt_block *block = ended(c) ? NULL : decode(c, f->number, &f->place, bytes, size, true);
+        const rqt_block *block =
+            ended(c) || !f->has_summary ? NULL : decode(c, f->number, &f->place, &f->summary, bytes, size, true);
         if (block) {
             const size_t side = ((size_t)1 << block->k) + 1;
             memcpy(f->block.q, block->q, side * side * sizeof *block->q);
             memcpy(f->block.error, block->error, side * side * sizeof *block->error);
             memcpy(f->block.flags, block->flags, side * side);
+            f->block.sparse = block->sparse;
+            f->block.floor = block->floor;
             f->has_block = true;
         }
     }
@@ -226,19 +276,17 @@ static const rqt_block *read_neighbour(check *c, rqt_block_number number, const 
     if (block || ended(c)) return block;
     if (step_to(c, c->row, number, false)) {
         size_t size;
-        const void *bytes = column_bytes(c, 1, &size);
-        if (!ended(c)) block = decode(c, number, place, bytes, size, false);
+        rqt_summary summary;
+        const void *bytes = column_bytes(c, 0, &size);
+        const bool readable = bytes && rqt_summary_decode(bytes, size, &summary) == RQT_OK;
+        bytes = column_bytes(c, 1, &size);
+        if (!ended(c) && readable) block = decode(c, number, place, &summary, bytes, size, false);
     }
     sqlite3_reset(c->row);
     return block;
 }
 
 /* ------------------------------------------------------------------------------------------- inside one block */
-
-static bool is_root_corner(const rqt_lattice *lattice, rqt_vertex v) {
-    const int32_t side = 1 << lattice->K;
-    return (v.x == 0 || v.x == side) && (v.y == 0 || v.y == side);
-}
 
 /* The grid place of a lattice vertex in the frame's block, or -1. */
 static ptrdiff_t place_in(const frame *f, rqt_vertex v) {
@@ -247,20 +295,8 @@ static ptrdiff_t place_in(const frame *f, rqt_vertex v) {
     return (ptrdiff_t)(dy / f->place.stride) * ((1 << f->block.k) + 1) + dx / f->place.stride;
 }
 
-static bool is_sample(const rqt_lattice *lattice, rqt_vertex v) {
-    return v.x < lattice->width && v.y < lattice->height;
-}
-
-/* Has a triangle with this vertex for a corner an area? They all lie within the largest power of two that divides
- * both coordinates. Vertices without one have no error. */
-static bool has_area(const rqt_lattice *lattice, rqt_vertex v) {
-    int32_t reach = 1;
-    while (reach < 1 << lattice->K && v.x % (2 * reach) == 0 && v.y % (2 * reach) == 0) reach *= 2;
-    return is_root_corner(lattice, v) || (v.x - reach < lattice->width - 1 && v.y - reach < lattice->height - 1);
-}
-
 typedef struct inside {
-    tally infinite, unsaturated, too_small, no_outline, past;
+    tally infinite, unsaturated, too_small, no_outline;
 } inside;
 
 /* One triangle that vertex m splits: apex p, its hypotenuse through m at a right angle to the way from m to p. Of
@@ -292,25 +328,22 @@ static void check_inside(check *c, frame *f) {
             const rqt_vertex at = {f->place.x + u * f->place.stride, f->place.y + v * f->place.stride};
             const size_t i = (size_t)(v * n + u);
             const rqt_code error = f->block.error[i];
+            if (!is_kept(&f->block, i)) continue;
             const bool root_corner = is_root_corner(lattice, at);
             if ((error == RQT_CODE_INFINITY) != root_corner) count(&found.infinite, at);
-            if (!is_sample(lattice, at) && (error || f->block.flags[i] & RQT_OUTLINE) && !has_area(lattice, at))
-                count(&found.past, at);
             if (error != RQT_CODE_INFINITY && error > c->max_error) c->max_error = error;
             rqt_vertex parents[2];
             for (int p = rqt_vertex_parents(lattice, at, parents); p-- > 0;) {
                 const ptrdiff_t above = place_in(f, parents[p]);
                 if (above < 0) continue;
                 const int outline = f->block.flags[i] & ~f->block.flags[above] & RQT_OUTLINE;
-                if ((f->block.error[above] < error || outline) &&
-                    (is_sample(lattice, parents[p]) || has_area(lattice, parents[p])))
+                if ((f->block.error[above] < error || outline) && has_area(lattice, parents[p]))
                     count(&found.unsaturated, parents[p]);
                 check_triangle(c, f, at, parents[p], &found);
             }
         }
     }
     tell_tally(c, f, &found.infinite, "has infinite errors elsewhere than at the root's corners, or not there");
-    tell_tally(c, f, &found.past, "has an error at a vertex past the raster, where no triangle has an area");
     tell_tally(c, f, &found.unsaturated, "has a vertex with less error or outline than one that depends on it");
     tell_tally(c, f, &found.too_small, "has an error smaller than what its vertex itself is off");
     tell_tally(c, f, &found.no_outline, "has a vertex between data and void without outline bit");
@@ -353,7 +386,9 @@ static void check_summary(check *c, const frame *f, const frame *parent) {
         const size_t center = (size_t)(half * (last + 1) + half);
         const rqt_code error = c->t->k > 0 ? f->block.error[center] : 0;
         const uint8_t flags = c->t->k > 0 ? f->block.flags[center] : 0;
-        if (s->center_error != error || s->center_flags != flags)
+        if (c->t->k > 0 && !is_kept(&f->block, center)
+                ? s->center_error > f->block.floor || s->center_flags & RQT_OUTLINE
+                : s->center_error != error || s->center_flags != flags)
             FOUND(c, f->number, "has another centre in its summary than in its data");
     }
     /* The far vertices are the parent's corners beside the one that the block shares with it. */
@@ -390,9 +425,9 @@ static void check_neighbours(check *c, const frame *f) {
         if (!other) continue;
         difference d = {0};
         if (south)
-            compare(f, (run){&f->block, 0, last, 1, 0}, (run){other, 0, 0, 1, 0}, last + 1, &d);
+            compare(c, f, (run){&f->block, 0, last, 1, 0}, (run){other, 0, 0, 1, 0}, last + 1, &d);
         else
-            compare(f, (run){&f->block, last, 0, 0, 1}, (run){other, 0, 0, 0, 1}, last + 1, &d);
+            compare(c, f, (run){&f->block, last, 0, 0, 1}, (run){other, 0, 0, 0, 1}, last + 1, &d);
         tell_difference(c, f, &d, south ? "its southern neighbour" : "its eastern neighbour", number);
     }
 }
@@ -403,7 +438,7 @@ static void check_parent(check *c, const frame *f, const frame *parent) {
     const int32_t u = f->place.i & 1 ? half : 0, v = f->place.j & 1 ? half : 0;
     difference d = {0};
     for (int32_t row = 0; row <= half; row++)
-        compare(f, (run){&f->block, 0, 2 * row, 2, 0}, (run){&parent->block, u, v + row, 1, 0}, half + 1, &d);
+        compare(c, f, (run){&f->block, 0, 2 * row, 2, 0}, (run){&parent->block, u, v + row, 1, 0}, half + 1, &d);
     tell_difference(c, f, &d, "its parent", parent->number);
 }
 
