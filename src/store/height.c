@@ -59,8 +59,8 @@ static double plane_height(const rqt_unit *unit, const rqt_leaf_corner leaf[3], 
     return metres_of(unit, a->q + wb * ((double)b->q - a->q) + wc * ((double)c->q - a->q));
 }
 
-/* The block of the place that answers: em falls from level to level, so the levels are searched by halves. NULL
- * where none of them does, in a damaged terrain. */
+/* The block of the place that answers: em falls from level to level, so the levels are searched by halves. Number 0
+ * where none does, in a damaged terrain. */
 static int find_answer(store *s, const store_terrain *t, int32_t x, int32_t y, rqt_code eps, rqt_outline outline,
                        rqt_answer *answer, char **error) {
     const int K = t->lattice.K;
