@@ -140,6 +140,7 @@ typedef struct explanation {
     rqt_lattice lattice;
     int k;
     rqt_placement placement;
+    double achieved_eps;
 } explanation;
 
 static void release_explanation(void *data) {
@@ -173,8 +174,14 @@ static void explain_column(void *data, size_t row, int column, sqlite3_context *
         break;
     }
     case 2:
-        text(result, read->needs_bytes ? "answers eps; its centre is selected, so its bytes are walked"
-                                       : "answers eps; nothing is selected inside, so its index row is enough");
+        if (read->computed)
+            text(result,
+                 read->needs_bytes
+                     ? "answers eps; made in memory, for the metric is not stored, and walked"
+                     : "answers eps; made in memory, for the metric is not stored; nothing is selected inside");
+        else
+            text(result, read->needs_bytes ? "answers eps; its centre is selected, so its bytes are walked"
+                                           : "answers eps; nothing is selected inside, so its index row is enough");
         break;
     case 3:
         sqlite3_result_int64(result, read->bytes);
@@ -184,6 +191,9 @@ static void explain_column(void *data, size_t row, int column, sqlite3_context *
         break;
     case 5:
         sqlite3_result_int64(result, read->selected);
+        break;
+    case 7:
+        sqlite3_result_double(result, e->achieved_eps);
         break;
     default:
         sqlite3_result_int64(result, (sqlite3_int64)read->number);
@@ -201,6 +211,7 @@ int fill_explain(connection *c, sqlite3_value **arguments, row_set *rows, char *
     if (e) {
         *e = (explanation){.lattice = r.terrain->lattice, .k = r.terrain->k, .placement = r.terrain->placement};
         code = request_patch(&r, &patch, &e->reads, error);
+        e->achieved_eps = r.achieved_eps;
     }
     rqt_patch_free(&patch);
     request_free(&r);

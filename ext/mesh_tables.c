@@ -9,6 +9,7 @@ typedef struct mesh {
     rqt_patch patch;
     format_frame frame;
     uint32_t *strip;
+    double achieved_eps;
 } mesh;
 
 static void release(void *data) {
@@ -36,10 +37,10 @@ static int make_mesh(connection *c, sqlite3_value **arguments, bool strip, row_s
         memset(m, 0, sizeof *m);
         m->frame = (format_frame){.placement = r.terrain->placement, .unit = r.terrain->unit, .eps = r.eps};
         code = request_patch(&r, &m->patch, NULL, error);
+        m->achieved_eps = r.achieved_eps;
     }
     size_t indices = 0;
-    if (code == SQLITE_OK && strip && rqt_strip_build(&m->patch, store_allocator(), &m->strip, &indices) != RQT_OK)
-        code = SQLITE_NOMEM;
+    if (code == SQLITE_OK && strip) code = request_strip(&r, &m->patch, &m->strip, &indices);
     request_free(&r);
     if (code != SQLITE_OK) {
         if (m) release(m);
@@ -61,6 +62,8 @@ static void range_column(void *data, size_t row, int column, sqlite3_context *re
         sqlite3_result_double(result, rqt_code_metres(v->error));
     else if (column == 4)
         sqlite3_result_int(result, v->level);
+    else if (column == 8)
+        sqlite3_result_double(result, m->achieved_eps);
     else
         sqlite3_result_int(result, column == 5 ? v->col : column == 6 ? v->row : v->q);
 }
@@ -78,6 +81,8 @@ static void triangles_column(void *data, size_t row, int column, sqlite3_context
     const mesh *m = data;
     if (column == 0)
         sqlite3_result_int64(result, (sqlite3_int64)row + 1);
+    else if (column == 10)
+        sqlite3_result_double(result, m->achieved_eps);
     else
         put_coordinate(m, m->patch.triangles[3 * row + (size_t)(column - 1) / 3], (column - 1) % 3, result);
 }
@@ -95,6 +100,8 @@ static void strip_column(void *data, size_t row, int column, sqlite3_context *re
     const mesh *m = data;
     if (column == 0)
         sqlite3_result_int64(result, (sqlite3_int64)row);
+    else if (column == 4)
+        sqlite3_result_double(result, m->achieved_eps);
     else
         put_coordinate(m, m->strip[row], column - 1, result);
 }

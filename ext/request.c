@@ -60,11 +60,12 @@ int request_read(connection *c, sqlite3_value *region, sqlite3_value *eps, sqlit
     memset(r, 0, sizeof *r);
     if (!request_number(eps, "eps", &r->eps, error)) return *error ? SQLITE_ERROR : SQLITE_NOMEM;
     if (r->eps < 0) return fail(error, "eps must be 0 or more; it is %!.15g", r->eps);
-    r->options = (store_query_options){RQT_SELECT_THRESHOLD, RQT_OUTLINE_EXACT};
+    r->options = (store_query_options){.select = RQT_SELECT_THRESHOLD, .outline = RQT_OUTLINE_EXACT};
+    r->achieved_eps = r->eps;
     int code = SQLITE_OK;
     if (options && sqlite3_value_type(options) != SQLITE_NULL) {
         const char *json = (const char *)sqlite3_value_text(options);
-        code = json ? options_read(json, &r->options, error) : SQLITE_NOMEM;
+        code = json ? options_read(json, r, error) : SQLITE_NOMEM;
     }
     if (code == SQLITE_OK) code = connection_store(c, &r->store, error);
     if (code == SQLITE_OK) r->connection = c;
@@ -75,7 +76,16 @@ int request_read(connection *c, sqlite3_value *region, sqlite3_value *eps, sqlit
 }
 
 int request_patch(request *r, rqt_patch *patch, store_reads *reads, char **error) {
-    return store_query(r->store, r->terrain, r->region, r->eps, &r->options, patch, reads, error);
+    if (r->max_vertices == 0)
+        return store_query(r->store, r->terrain, r->region, r->eps, &r->options, patch, reads, error);
+    return store_query_within(r->store, r->terrain, r->region, r->eps, &r->options, r->max_vertices,
+                              &r->achieved_eps, patch, reads, error);
+}
+
+int request_strip(const request *r, const rqt_patch *patch, uint32_t **strip, size_t *n) {
+    const rqt_status status = r->fans ? rqt_strip_build_fans(patch, store_allocator(), strip, n)
+                                      : rqt_strip_build(patch, store_allocator(), strip, n);
+    return status == RQT_OK ? SQLITE_OK : SQLITE_NOMEM;
 }
 
 void request_free(request *r) {

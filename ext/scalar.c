@@ -110,14 +110,13 @@ static int own_format(const request *r, const rqt_patch *patch, rqt_mesh_kind ki
                       char **error) {
     uint32_t *strip = NULL;
     size_t indices = 3 * patch->triangle_count;
-    if (kind == RQT_MESH_STRIP && rqt_strip_build(patch, store_allocator(), &strip, &indices) != RQT_OK)
-        return SQLITE_NOMEM;
+    if (kind == RQT_MESH_STRIP && request_strip(r, patch, &strip, &indices) != SQLITE_OK) return SQLITE_NOMEM;
     const rqt_mesh_header header = {.kind = kind,
                                     .vertex_count = patch->vertex_count,
                                     .index_count = indices,
                                     .placement = r->terrain->placement,
                                     .unit = r->terrain->unit,
-                                    .eps = r->eps,
+                                    .eps = r->achieved_eps,
                                     .srid = r->terrain->srid};
     *size = rqt_mesh_bytes(&header);
     int code = SQLITE_OK;
@@ -138,7 +137,7 @@ static int other_format(const request *r, const rqt_patch *patch, format_kind ki
                                 .unit = r->terrain->unit,
                                 .srid = r->terrain->srid,
                                 .title = r->terrain->name,
-                                .eps = r->eps};
+                                .eps = r->achieved_eps};
     const rqt_status status = format_patch(patch, &frame, kind, store_allocator(), bytes, size);
     if (status == RQT_OK) return SQLITE_OK;
     if (status == RQT_NO_MEMORY) return SQLITE_NOMEM;

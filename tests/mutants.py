@@ -26,7 +26,7 @@ MUTANTS = [
     ("bound: eps ignores what quantisation lost", "src/core/code.c",
      "if ((eps - rest) - quantum_error < 0) rest = nextafter(rest, 0);", "",
      "test_core_codes", "eps_gives_up_the_quantum_error_and_rounds_down"),
-    ("voids: an outline costs nothing", "src/core/deviation.c", "if (ground > code) code = ground;", "(void)ground;",
+    ("voids: an outline costs nothing", "src/core/deviation.c", "if (out.ground > out.code) out.code = out.ground;", "(void)out.ground;",
      "test_core_lattice", "errors_equal_the_oracles_for_every_small_extent"),
     ("voids: two valid corners are enough", "src/core/query.c",
      "if (!(a->flags & b->flags & c->flags & RQT_VALID)) return false;",

@@ -197,11 +197,16 @@ triangle_error irregular_error(const deviation_field *s, const rqt_triangle *t, 
     const bool has_plane = valid_at(s, a.x, a.y) && valid_at(s, l.x, l.y) && valid_at(s, r.x, r.y);
     scan found = {known_state, 0, 1};
     if (known_state < 0 || has_plane) found = scan_triangle(s, a, l, r, has_plane);
-    triangle_error out = {found.state, has_plane ? scan_code(s, &found) : 0, false};
+    triangle_error out = {.state = found.state, .denominator = 1};
+    if (has_plane) {
+        out.code = scan_code(s, &found);
+        out.deviation = found.deviation;
+        out.denominator = found.denominator;
+    }
     out.mixed = found.state == (HAS_VALID | HAS_VOID);
     if (out.mixed) {
-        const rqt_code ground = outline_code(s, a, l, r);
-        if (ground > out.code) out.code = ground;
+        out.ground = outline_code(s, a, l, r);
+        if (out.ground > out.code) out.code = out.ground;
     }
     return out;
 }

@@ -32,9 +32,14 @@ static inline int state_at(const deviation_field *s, int32_t x, int32_t y) {
 }
 
 typedef struct triangle_error {
-    int state; /* HAS_VALID | HAS_VOID over the closed triangle */
-    rqt_code code;
+    int state;     /* HAS_VALID | HAS_VOID over the closed triangle */
+    rqt_code code; /* the larger of deviation and ground */
     bool mixed;
+    /* The parts: the largest |height - plane| is deviation / denominator quanta, 0 where a corner is void; what an
+     * outline costs, 0 unless mixed. */
+    unsigned __int128 deviation;
+    uint64_t denominator;
+    rqt_code ground;
 } triangle_error;
 
 /* The deviation of a triangle inside the raster whose samples are all valid, as a multiple of 2^-*shift quanta. */

@@ -480,6 +480,41 @@ rqt_status rqt_query_run(rqt_query *query, const rqt_allocator *allocator, rqt_p
  * i, counter-clockwise; a triangle with two equal vertices is a join. An empty patch gives n = 0.
  * Release with allocator->resize(context, strip, 0). */
 rqt_status rqt_strip_build(const rqt_patch *patch, const rqt_allocator *allocator, uint32_t **strip, size_t *n);
+/* The same as rqt_strip_build, by the walk of [RQT] section 7: round the centres of quadtree blocks. Needs
+ * patch->leaves (RQT_INVALID without). */
+rqt_status rqt_strip_build_fans(const rqt_patch *patch, const rqt_allocator *allocator, uint32_t **strip,
+                                size_t *n);
+
+/* ---------------------------------------------------------------------------------------- other metrics --
+ * Other answers to the question "how wrong is a mesh without this vertex", for comparing, and the one that gives
+ * the smallest meshes: METHODS.md beside this file has the definitions, the proofs, and what each costs. Every
+ * triangle T of the bintree gets a number; a vertex gets the larger number of its diamond; saturation does the
+ * rest, as for the exact errors, which are the metric `exact`. `minimal` alone is made otherwise: it is closed by
+ * nature. */
+typedef enum rqt_metric {
+    RQT_METRIC_EXACT,   /* the largest vertical distance of a sample of T from T's plane: a bound */
+    RQT_METRIC_MINIMAL, /* the least closed set no leaf of which has a larger one: a bound, and the smallest mesh */
+    RQT_METRIC_LOCAL,   /* of the split vertex alone from the hypotenuse: no bound */
+    RQT_METRIC_WEDGIE,  /* that, plus the larger number of the two halves: a bound, not a tight one */
+    RQT_METRIC_EUCLID   /* the largest distance of a sample of T from T's plane in space: no bound of heights */
+} rqt_metric;
+#define RQT_METRICS 5
+
+/* "exact", "minimal" ...; NULL when there is none. */
+const char *rqt_metric_name(rqt_metric metric);
+/* Is the mesh of eps nowhere further than eps from a sample, vertically? */
+bool rqt_metric_is_bound(rqt_metric metric);
+/* The most bytes that rqt_metric_compute holds at a time, its result included. */
+size_t rqt_metric_bytes(const rqt_lattice *lattice, rqt_metric metric);
+/* The metric of every vertex, closed, and the outline bits, so that a threshold selects: for rqt_pyramid_create.
+ * minimal depends on the outline, because a mixed triangle that has to go takes others along: with
+ * RQT_OUTLINE_EXACT, codes of vertices that are in every mesh are RQT_CODE_LARGEST, with the bit. Codes are rounded
+ * up: exactly, except for euclid, which may be one code further up where it is within 2^-40 of a code, and wedgie,
+ * whose parts at the raster's edge and at voids are rounded up to half a quantum each. O(n log n) time.
+ * progress as in rqt_errors_compute. */
+rqt_status rqt_metric_compute(const rqt_grid *grid, const rqt_unit *unit, const rqt_void_cost *cost,
+                              rqt_metric metric, rqt_outline outline, const rqt_allocator *allocator,
+                              bool (*progress)(void *context, double done), void *context, rqt_errors *closed);
 
 /* --------------------------------------------------------------------------------------- mesh formats --
  * The formats of our own that stand alone (FORMAT.md, "Mesh"): 'strip' and 'indexed'. */

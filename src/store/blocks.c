@@ -11,7 +11,8 @@ int store_block_bytes(store *s, const store_terrain *t, rqt_block_number number,
     *size = 0;
     if (!*kept) {
         const int code = store_prepare(
-            s, t, kept, sqlite3_mprintf("SELECT data FROM \"%w\".rqt_block_%lld WHERE id = ?1", t->schema, t->id),
+            s, t, kept,
+            sqlite3_mprintf("SELECT data FROM \"%w\".rqt_block_%lld%s WHERE id = ?1", t->schema, t->id, t->suffix),
             error);
         if (code != SQLITE_OK) return code;
     }
@@ -81,8 +82,10 @@ static int window(store *s, const store_terrain *t, int32_t col, int32_t row, in
      */
     const int32_t last_i = t->lattice.width > 1 ? (t->lattice.width - 2) >> shift : 0;
     const int32_t last_j = t->lattice.height > 1 ? (t->lattice.height - 2) >> shift : 0;
-    for (int32_t j = row >> shift; j <= last_j && j << shift < row + height; j++) {
-        for (int32_t i = col >> shift; i <= last_i && i << shift < col + width; i++) {
+    const int32_t first_i = col >> shift < last_i ? col >> shift : last_i,
+                  first_j = row >> shift < last_j ? row >> shift : last_j;
+    for (int32_t j = first_j; j <= last_j && j << shift < row + height; j++) {
+        for (int32_t i = first_i; i <= last_i && i << shift < col + width; i++) {
             const rqt_block *block;
             int read;
             const int code = store_get_block(s, t, rqt_block_number_of(level, i, j), &block, &read, error);

@@ -65,7 +65,7 @@ static int mesh_height(store *s, const store_terrain *t, double x, double y, dou
         status = rqt_region_create(geometry, &t->placement, &t->lattice, store_allocator(), &region);
     int code = store_fail_core(error, status, "the point");
     rqt_patch patch = {0};
-    const store_query_options options = {RQT_SELECT_THRESHOLD, RQT_OUTLINE_EXACT};
+    const store_query_options options = {.select = RQT_SELECT_THRESHOLD, .outline = RQT_OUTLINE_EXACT};
     if (code == SQLITE_OK) code = store_query(s, t, region, eps, &options, &patch, NULL, error);
     if (code == SQLITE_OK && patch.triangle_count > 0) {
         const rqt_patch_vertex *a = &patch.vertices[patch.triangles[0]], *b = &patch.vertices[patch.triangles[1]],

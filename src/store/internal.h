@@ -17,8 +17,8 @@ typedef struct statements {
 
 struct store {
     sqlite3 *db;
-    store_terrain *terrains;
-    statements *statements; /* one per terrain */
+    store_terrain *terrains; /* count as they are; then each again, as its minimal errors' tables have it */
+    statements *statements;  /* one for each of both */
     int count;
     bool known;                         /* terrains are read, and the cache holds only what is theirs */
     uint64_t version;                   /* of all databases, when they were read */
@@ -27,6 +27,8 @@ struct store {
     int holders;                        /* calls of store_begin that have not ended */
     block_cache *cache;
     rqt_codec *codec;
+    struct method_cache *methods; /* what was computed, for one terrain; NULL: nothing */
+    size_t method_memory;
 };
 
 /* Set *error to a sentence and return code (SQLITE_NOMEM when there is no memory for the sentence). terrain.c */
@@ -57,5 +59,30 @@ int store_block_bytes(store *s, const store_terrain *t, rqt_block_number number,
 /* The decoded block, from the cache or the database. *read: bytes read now, 0 when it was cached. blocks.c */
 int store_get_block(store *s, const store_terrain *t, rqt_block_number number, const rqt_block **block, int *read,
                     char **error);
+
+/* A query when its eps is a code. */
+typedef struct store_question {
+    const rqt_region *region;
+    rqt_code eps;
+    const store_query_options *options;
+    size_t most; /* vertices: with more, stop and say over; 0: any number */
+    bool over;
+} store_question;
+/* From the tables of t (metric is not looked at). query.c */
+int store_query_tables(store *s, const store_terrain *t, store_question *question, rqt_patch *patch,
+                       store_reads *reads, char **error);
+/* From errors in memory, computed first if need be. *largest, when not NULL: the largest finite code. methods.c */
+int store_query_computed(store *s, const store_terrain *t, store_question *question, rqt_patch *patch,
+                         store_reads *reads, rqt_code *largest, char **error);
+void store_methods_free(store *s);
+/* A row per answer of a query, as its summary has it. query.c */
+int store_begin_reads(const rqt_query *query, store_reads *reads);
+int64_t store_count_selected(const rqt_query *query, const rqt_block *block);
+/* Was sqlite3_interrupt called? *code says how to end. query.c */
+bool store_is_interrupted(store *s, int *code);
+
+#define STORE_MINIMAL "_minimal" /* suffix of the tables that hold minimal errors */
+/* The terrain as the tables of its minimal errors have it; NULL when it has none. minimal.c */
+const store_terrain *store_minimal(store *s, const store_terrain *t);
 
 #endif

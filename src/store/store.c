@@ -34,6 +34,7 @@ int store_open(sqlite3 *db, store **out) {
     if (!s) return SQLITE_NOMEM;
     memset(s, 0, sizeof *s);
     s->db = db;
+    s->method_memory = STORE_METHOD_MEMORY;
     s->cache = block_cache_create(store_allocator(), CACHE_BYTES);
     if (!s->cache || rqt_codec_create(store_allocator(), &s->codec) != RQT_OK) {
         store_close(s);
@@ -55,7 +56,7 @@ static void finalize(statements *p) {
 }
 
 static void finalize_all(store *s) {
-    for (int i = 0; i < s->count; i++) finalize(&s->statements[i]);
+    for (int i = 0; i < 2 * s->count; i++) finalize(&s->statements[i]);
 }
 
 void store_release(store *s) {
@@ -77,6 +78,7 @@ static void forget(store *s) {
     s->terrains = NULL;
     s->count = 0;
     s->known = false;
+    store_methods_free(s);
     block_cache_clear(s->cache);
 }
 
@@ -156,9 +158,17 @@ static int refresh(store *s, char **error) {
     int code = store_read_terrains(s->db, &s->terrains, &s->count, error);
     if (code != SQLITE_OK) return code;
     if (s->count > 0) {
-        const sqlite3_uint64 bytes = (sqlite3_uint64)s->count * sizeof *s->statements;
+        const sqlite3_uint64 n = (sqlite3_uint64)s->count, bytes = 2 * n * sizeof *s->statements;
         s->statements = sqlite3_malloc64(bytes);
-        if (!s->statements) {
+        store_terrain *both = sqlite3_realloc64(s->terrains, 2 * n * sizeof *both);
+        if (both) {
+            s->terrains = both;
+            memcpy(both + n, both, n * sizeof *both);
+            for (sqlite3_uint64 i = n; i < 2 * n; i++) both[i].suffix = STORE_MINIMAL;
+        }
+        if (!s->statements || !both) {
+            sqlite3_free(s->statements);
+            s->statements = NULL;
             store_terrains_free(s->terrains, s->count);
             s->terrains = NULL;
             s->count = 0;
