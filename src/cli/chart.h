@@ -21,6 +21,7 @@ typedef struct chart_point {
     double max_error, rms_error; /* what the verifier found, metres */
     int64_t samples, vertices, triangles;
     int64_t bytes, blocks; /* of blocks that the answer needs */
+    int64_t fresh_bytes;   /* of the pages that the first query of a new connection reads */
     double ms, fresh_ms;   /* median of warm queries; the first query of a new connection */
     int runs;
     double amplitude; /* charts 5 and 6: of the noise; samples a side */

@@ -8,6 +8,7 @@
 #include "format.h"
 
 #include <errno.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -32,6 +33,7 @@ typedef enum cell {
     BYTES,
     MS,
     FRESH_MS,
+    FRESH_BYTES,
     RUNS,
     IS_FRONT,
     AMPLITUDE,
@@ -52,6 +54,7 @@ static const char *const CELL_NAMES[] = {[SERIES] = "series",
                                          [BYTES] = "bytes",
                                          [MS] = "ms",
                                          [FRESH_MS] = "fresh_ms",
+                                         [FRESH_BYTES] = "fresh_bytes",
                                          [RUNS] = "runs",
                                          [IS_FRONT] = "front",
                                          [AMPLITUDE] = "noise",
@@ -61,6 +64,7 @@ typedef struct chart_plan {
     const char *name, *heading;
     bool draws_all; /* also methods whose mesh is another's, and only the time differs */
     cell cells[16];
+    cell x, y;            /* of logarithmic axes; FRESH_MS: of both kinds of times */
     const char *settings; /* gnuplot: axes; a second panel is set where it is drawn */
 } chart_plan;
 
@@ -72,44 +76,58 @@ static const chart_plan PLANS[] = {
                               "True error against vertices",
                               false,
                               {SERIES, EPS, MAX_ERROR, RMS_ERROR, VERTICES, TRIANGLES},
+                              VERTICES,
+                              MAX_ERROR,
                               ERROR_AXIS("y") "set logscale x\nset xlabel 'vertices'\nset format x '%.0s%c'\n"
                                               "set key top right\n"},
     [CHART_ERROR_EPS] = {"2-error-eps",
                          "True error over the tolerance that was asked for",
                          false,
                          {SERIES, EPS, MAX_ERROR, RATIO, RMS_ERROR},
+                         EPS,
+                         MAX_ERROR,
                          ERROR_AXIS("y") "set logscale x\nset xlabel 'tolerance asked for, metres'\n"
                                          "set format x '%g'\nset key top left\n"},
     [CHART_TIME_ERROR] = {"3-time-error",
                           "Time against true error",
                           true,
-                          {SERIES, EPS, MAX_ERROR, MS, FRESH_MS, RUNS, BLOCKS, BYTES},
+                          {SERIES, EPS, MAX_ERROR, MS, FRESH_MS, RUNS, BLOCKS, BYTES, FRESH_BYTES},
+                          MAX_ERROR,
+                          FRESH_MS,
                           ERROR_AXIS("x") "set logscale y\nset ylabel 'milliseconds'\nset format y '%g'\n"
                                           "set key outside right\n"},
     [CHART_FRONT] = {"4-front",
                      "Time, true error and vertices: what nothing else beats in all three is ringed",
                      true,
                      {SERIES, EPS, MS, MAX_ERROR, VERTICES, IS_FRONT},
+                     MS,
+                     MAX_ERROR,
                      ERROR_AXIS(
                          "y") "set logscale x\nset xlabel 'milliseconds'\nset format x '%g'\nset logscale cb\n"
-                              "set cblabel 'vertices'\nset format cb '%.0s%c'\n"
+                              "set cblabel 'vertices' offset 1.5\nset format cb '%.0s%c'\n"
                               "set palette defined (0 '#fde725', 1 '#5ec962', 2 '#21918c', 3 '#3b528b', 4 "
-                              "'#440154')\nset key outside bottom center horizontal\n"},
+                              "'#440154')\nset key bottom left\n"},
     [CHART_NOISE] = {"5-noise",
                      "White noise on top of the terrain",
                      false,
                      {SERIES, TERRAIN, AMPLITUDE, EPS, MAX_ERROR, VERTICES, OVER_MINIMAL},
+                     END,
+                     END,
                      "set xlabel 'largest noise, metres'\nset format x '%g'\n"},
     [CHART_SIZE] = {"6-size",
                     "The same window out of ever larger terrains",
                     false,
-                    {SERIES, TERRAIN, SIDE, EPS, VERTICES, MS, FRESH_MS, RUNS, BLOCKS, BYTES},
+                    {SERIES, TERRAIN, SIDE, EPS, VERTICES, MS, FRESH_MS, RUNS, BLOCKS, BYTES, FRESH_BYTES},
+                    END,
+                    END,
                     "set logscale x 2\nset xlabel 'samples along a side of the terrain'\nset format x '%.0f'\n"},
     [CHART_ALL] = {"rows",
                    "",
                    true,
                    {SERIES, TERRAIN, EPS, MAX_ERROR, RMS_ERROR, SAMPLES, VERTICES, TRIANGLES, BLOCKS, BYTES, MS,
-                    FRESH_MS, RUNS, IS_FRONT},
+                    FRESH_MS, FRESH_BYTES, RUNS, IS_FRONT},
+                   END,
+                   END,
                    NULL}};
 
 /* --------------------------------------------------------------------------------------------- numbers -- */
@@ -199,6 +217,9 @@ static void write_cell(FILE *file, cell which, const chart_points *points, const
         break;
     case FRESH_MS:
         write_time(file, p->fresh_ms, missing);
+        break;
+    case FRESH_BYTES:
+        write_count(file, p->fresh_bytes, missing);
         break;
     case RUNS:
         write_count(file, p->runs, missing);
@@ -292,8 +313,9 @@ static void write_line(FILE *file, const char *name) {
 #define X_AMPLITUDE "7"
 #define X_SIDE "8"
 #define X_RATIO "9"
-static const cell BLOCK[] = {EPS,       MAX_ERROR, VERTICES,     MS,       FRESH_MS, BYTES,
-                             AMPLITUDE, SIDE,      OVER_MINIMAL, IS_FRONT, END};
+#define X_FRESH_BYTES "11"
+static const cell BLOCK[] = {EPS,       MAX_ERROR, VERTICES,     MS,       FRESH_MS,    BYTES,
+                             AMPLITUDE, SIDE,      OVER_MINIMAL, IS_FRONT, FRESH_BYTES, END};
 
 static void write_blocks(FILE *file, const series_list *list, const chart_points *points) {
     for (int s = 0; s < list->count; s++) {
@@ -323,20 +345,44 @@ static void write_text(FILE *file, const char *text) {
     fputc('\'', file);
 }
 
-static void write_head(FILE *file, const chart_sheet *sheet, const chart_plan *plan) {
-    fprintf(file, "# %s - gnuplot %s.gp draws %s.svg and %s.png\nset encoding utf8\nset title ", plan->name,
-            plan->name, plan->name, plan->name);
-    write_text(file, plan->heading);
-    fputs(" noenhanced offset 0,1 font ',15'\nset label 1 ", file);
-    write_text(file, sheet->title);
-    fputs(" at graph 0.5,1.03 center noenhanced font ',10' textcolor rgb '#444444'\nset label 2 ", file);
-    write_text(file, sheet->note);
-    fputs(" at screen 0.99,0.015 right noenhanced font ',8' textcolor rgb '#777777'\n"
-          "set tmargin 5\nset bmargin 5\nset border 3 lc rgb '#444444'\nset tics nomirror\n"
-          "set grid lc rgb '#dddddd' lw 0.7\nset style data linespoints\nset key noenhanced samplen 2.5 spacing "
-          "1.15\n",
-          file);
+static void write_head(FILE *file, const chart_plan *plan) {
+    fprintf(file,
+            "# %s - gnuplot %s.gp draws %s.svg and %s.png\nset encoding utf8\nset tmargin 4.5\nset bmargin 5\n"
+            "set border 3 lc rgb '#444444'\nset tics nomirror\nset grid lt 1 dt 1 lc rgb '#e4e4e4' lw 0.7\n"
+            "set key noenhanced samplen 2.5 spacing 1.15\n",
+            plan->name, plan->name, plan->name, plan->name);
     fputs(plan->settings, file);
+}
+
+/* Above the panel, or above both. The second of a pair takes them away, so that they are drawn once. */
+static void write_headings(FILE *file, const chart_sheet *sheet, const chart_plan *plan, bool is_pair) {
+    const char *where = is_pair ? "screen 0.5" : "graph 0.5";
+    fputs("  set label 1 ", file);
+    write_text(file, plan->heading);
+    fprintf(file, " at %s,screen 0.96 center noenhanced font ',14'\n  set label 2 ", where);
+    write_text(file, sheet->title);
+    fprintf(file, " at %s,screen 0.915 center noenhanced font ',10' textcolor rgb '#444444'\n  set label 3 ",
+            where);
+    write_text(file, sheet->note);
+    fputs(" at screen 0.99,0.015 right noenhanced font ',8' textcolor rgb '#777777'\n", file);
+}
+
+/* Of a logarithmic axis: what the series have, and a little more. */
+static void write_range(FILE *file, char axis, cell which, const series_list *list, const chart_points *points) {
+    double low = INFINITY, high = 0;
+    for (int i = 0; i < points->count; i++) {
+        const chart_point *p = &points->rows[i];
+        if (!is_listed(list, p->series, strlen(p->series))) continue;
+        const bool is_fresh = which == FRESH_MS && !strcmp(p->series, "exact");
+        const double value = which == EPS         ? p->eps
+                             : which == MAX_ERROR ? p->max_error
+                             : which == VERTICES  ? (double)p->vertices
+                             : is_fresh           ? fmax(p->ms, p->fresh_ms)
+                                                  : p->ms;
+        if (value > 0) high = fmax(high, value);
+        if (value > 0) low = fmin(low, which == FRESH_MS ? p->ms : value);
+    }
+    if (low > 0 && low <= high) fprintf(file, "set %crange [%.6g:%.6g]\n", axis, low / 1.25, high * 1.25);
 }
 
 static const char EACH_FORM[] =
@@ -389,12 +435,12 @@ static void write_front(FILE *file, const series_list *list) {
     fputc('\n', file);
 }
 
-/* Two panels side by side; the headings stand over the first and are wiped for the second. */
+/* Two panels side by side; the headings are drawn with the first. */
 static void write_left(FILE *file) {
     fputs("  set multiplot\n  set origin 0,0\n  set size 0.5,1\n", file);
 }
 static void write_right(FILE *file) {
-    fputs("  set origin 0.5,0\n  unset label 2\n", file);
+    fputs("  set origin 0.5,0\n  unset label\n", file);
 }
 
 static void write_noise(FILE *file, const series_list *list, bool has_minimal) {
@@ -416,8 +462,13 @@ static void write_size(FILE *file, const series_list *list) {
     fputs("  set yrange [0:*]\n  set ylabel 'milliseconds'\n  set format y '%g'\n  set key bottom right\n", file);
     write_times(file, list, X_SIDE);
     write_right(file);
-    fputs("  set ylabel 'bytes of blocks read'\n  set format y '%.0s %cB'\n", file);
-    write_plot(file, list, X_SIDE, X_BYTES, "");
+    fputs("  set ylabel 'bytes'\n  set format y '%.0s %cB'\n", file);
+    fputs(
+        "  plot $series0 using " X_SIDE ":" X_FRESH_BYTES
+        " with linespoints lc rgb '#0072b2' lw 1.2 pt 6 ps 0.8 dt (6,4) title 'pages of the file, new connection', "
+        "\\\n    $series0 using " X_SIDE ":" X_BYTES
+        " with linespoints lc rgb '#0072b2' lw 2.5 pt 7 ps 0.8 title 'blocks of the answer'\n",
+        file);
     fputs("  unset multiplot\n", file);
 }
 
@@ -426,14 +477,12 @@ static void write_script(FILE *file, const chart_sheet *sheet, chart_kind kind, 
     series_list list;
     list_series(plan, points, &list);
     const bool is_pair = kind == CHART_NOISE || kind == CHART_SIZE;
-    write_head(file, sheet, plan);
+    write_head(file, plan);
+    if (plan->x) write_range(file, 'x', plan->x, &list, points);
+    if (plan->y) write_range(file, 'y', plan->y, &list, points);
     write_blocks(file, &list, points);
     fprintf(file, EACH_FORM, is_pair ? 1200 : 1000, is_pair ? 1680 : 1400, plan->name);
-    if (is_pair) {
-        fputs("  set label 2 ", file);
-        write_text(file, sheet->note);
-        fputs(" at screen 0.99,0.015 right noenhanced font ',8' textcolor rgb '#777777'\n", file);
-    }
+    write_headings(file, sheet, plan, is_pair);
     switch (kind) {
     case CHART_ERROR_VERTICES:
         write_plot(file, &list, X_VERTICES, X_ERROR, "");

@@ -154,6 +154,21 @@ static int compare_times(const void *a, const void *b) {
     return (x > y) - (x < y);
 }
 
+/* Pages that SQLite read from the file since the last call. Their number times their size is what a query cost the
+ * disk, or the system's cache of it: index and tables included. */
+static int64_t pages_read(sqlite3 *db) {
+    int now = 0, highest = 0;
+    sqlite3_db_status(db, SQLITE_DBSTATUS_CACHE_MISS, &now, &highest, 1);
+    return now;
+}
+
+static int64_t page_size(sqlite3 *db) {
+    sqlite3_stmt *row = cli_prepare(db, "PRAGMA page_size");
+    const int64_t size = row && sqlite3_step(row) == SQLITE_ROW ? sqlite3_column_int64(row, 0) : 0;
+    sqlite3_finalize(row);
+    return size;
+}
+
 /* Milliseconds of one run; -1 when it failed. */
 static double run_once(sqlite3_stmt *statement) {
     const double begin = cli_seconds();
@@ -199,7 +214,9 @@ static chart_answer time_fresh(const chart_query *q, const chart_method *method,
         sqlite3 *db = cli_open(q->path);
         sqlite3_stmt *mesh = db ? prepare(db, MESH, q, method, eps) : NULL;
         chart_answer answer = mesh ? CHART_MEASURED : CHART_BROKEN;
+        if (mesh) (void)pages_read(db);
         if (mesh && (times[runs] = run_once(mesh)) < 0) answer = explain_failure(db, method);
+        if (answer == CHART_MEASURED) p->fresh_bytes = pages_read(db) * page_size(db);
         sqlite3_finalize(mesh);
         sqlite3_close(db);
         if (answer != CHART_MEASURED) return answer;

@@ -29,7 +29,7 @@ static bool split(char *line, char *cells[COLUMNS]) {
 static bool read_row(char *line, chart_point *p) {
     char *cells[COLUMNS];
     int64_t samples, vertices, triangles;
-    *p = (chart_point){.is_peer = true, .bytes = -1, .blocks = -1, .fresh_ms = -1, .runs = 1};
+    *p = (chart_point){.is_peer = true, .bytes = -1, .blocks = -1, .fresh_bytes = -1, .fresh_ms = -1, .runs = 1};
     if (!split(line, cells) || !*cells[0] || strlen(cells[0]) >= sizeof p->series || strpbrk(cells[0], "'\"\\"))
         return false;
     snprintf(p->series, sizeof p->series, "%s", cells[0]);

@@ -287,7 +287,8 @@ static bool find_family(sqlite3 *db, const char *mark, family *f, int *others) {
     return code == SQLITE_DONE;
 }
 
-/* What all members have in common; --region has the last word. NULL after a sentence. */
+/* The middle of what all members have in common, half as wide and high, so that the smallest goes on around it too;
+ * --region has the last word. NULL after a sentence. */
 static char *common_window(const job *j, const family *f) {
     if (j->region) return strdup(j->region);
     double box[4];
@@ -301,8 +302,9 @@ static char *common_window(const job *j, const family *f) {
         cli_say("the terrains %s_size_* have no place in common: chart 6 is left out", f->stem);
         return NULL;
     }
+    const double x = (box[2] - box[0]) / 4, y = (box[3] - box[1]) / 4;
     char text[160];
-    snprintf(text, sizeof text, "%.17g,%.17g,%.17g,%.17g", box[0], box[1], box[2], box[3]);
+    snprintf(text, sizeof text, "%.17g,%.17g,%.17g,%.17g", box[0] + x, box[1] + y, box[2] - x, box[3] - y);
     return cli_region(text);
 }
 

@@ -4,15 +4,15 @@
 # Charts 1 to 4 of three real DEMs (of the project; DATA=dir: of the six with the largest crops in there), with peers where
 # they can be had (peers.sh), and the table of vertices at equal true error. Charts 5 and 6 of two generated families: one
 # terrain under more and more white noise, and crops of one terrain that grow around the same window.
-#   CHART_K=12      the largest terrain of the family of sizes has 2^K + 1 samples a side
+#   CHART_K=13      the largest terrain of the family of sizes has 2^K + 1 samples a side
 #   NOISE=0,...     amplitudes in metres
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 BUILD=${BUILD:-build}
 RQT=${RQT:-$BUILD/rqt}
 OUT=$BUILD/chart
-K=${CHART_K:-12}
-SMALLEST_K=9
+K=${CHART_K:-13}
+SMALLEST_K=10
 NOISE=${NOISE:-0 0.5 1 2 4 8}
 NOISE_SIDE=1025
 mkdir -p "$OUT/families"
