@@ -118,7 +118,7 @@ static const chart_plan PLANS[] = {
                     "The same window out of ever larger terrains",
                     false,
                     {SERIES, TERRAIN, SIDE, EPS, VERTICES, MS, FRESH_MS, RUNS, BLOCKS, BYTES, FRESH_BYTES},
-                    END,
+                    SIDE,
                     END,
                     "set logscale x 2\nset xlabel 'samples along a side of the terrain'\nset format x '%.0f'\n"},
     [CHART_ALL] = {"rows",
@@ -367,16 +367,22 @@ static void write_headings(FILE *file, const chart_sheet *sheet, const chart_pla
     fputs(" at screen 0.99,0.015 right noenhanced font ',8' textcolor rgb '#777777'\n", file);
 }
 
+/* Metrics whose first query on a new connection is drawn: what is stored, and the best of what is computed. */
+static bool shows_fresh(const char *series) {
+    return !strcmp(series, "exact") || !strcmp(series, "minimal");
+}
+
 /* Of a logarithmic axis: what the series have, and a little more. */
 static void write_range(FILE *file, char axis, cell which, const series_list *list, const chart_points *points) {
     double low = INFINITY, high = 0;
     for (int i = 0; i < points->count; i++) {
         const chart_point *p = &points->rows[i];
         if (!is_listed(list, p->series, strlen(p->series))) continue;
-        const bool is_fresh = which == FRESH_MS && !strcmp(p->series, "exact");
+        const bool is_fresh = which == FRESH_MS && shows_fresh(p->series);
         const double value = which == EPS         ? p->eps
                              : which == MAX_ERROR ? p->max_error
                              : which == VERTICES  ? (double)p->vertices
+                             : which == SIDE      ? (double)p->side
                              : is_fresh           ? fmax(p->ms, p->fresh_ms)
                                                   : p->ms;
         if (value > 0) high = fmax(high, value);
@@ -404,15 +410,18 @@ static void write_plot(FILE *file, const series_list *list, const char *x, const
     fputc('\n', file);
 }
 
-/* The first query of a connection beside the warm ones, for the method that is asked for most. */
+/* The first query of a connection beside the warm ones. */
 static void write_times(FILE *file, const series_list *list, const char *x) {
-    char more[400] = "";
-    for (int s = 0; s < list->count; s++)
-        if (!strcmp(list->names[s], "exact"))
-            snprintf(more, sizeof more,
-                     "$series%d using %s:" X_FRESH " with linespoints lc rgb '%s' lw 1.2 pt 6 ps 0.8 dt (6,4) "
-                     "title 'exact, new connection'",
-                     s, x, look_of("exact")->colour);
+    char more[1000] = "";
+    for (int s = 0; s < list->count; s++) {
+        const size_t length = strlen(more);
+        if (shows_fresh(list->names[s]))
+            snprintf(more + length, sizeof more - length,
+                     "%s$series%d using %s:" X_FRESH " with linespoints lc rgb '%s' lw 1.2 pt %d ps 0.8 dt (6,4) "
+                     "title '%s, new connection'",
+                     length ? ", \\\n    " : "", s, x, look_of(list->names[s])->colour,
+                     look_of(list->names[s])->point - 1, list->names[s]);
+    }
     write_plot(file, list, x, X_MS, more);
 }
 
@@ -443,23 +452,24 @@ static void write_right(FILE *file) {
     fputs("  set origin 0.5,0\n  unset label\n", file);
 }
 
-static void write_noise(FILE *file, const series_list *list, bool has_minimal) {
+static void write_noise(FILE *file, const series_list *list, const chart_points *points) {
+    const bool has_minimal = is_listed(list, "minimal", strlen("minimal"));
     if (has_minimal) write_left(file);
-    fputs(
-        "  set logscale y\n  set ylabel 'vertices'\n  set format y '%.0s%c'\n  set yrange [*:*]\n  set key bottom "
-        "right\n",
-        file);
+    fputs("  set logscale y\n  set ylabel 'vertices'\n  set format y '%.0s%c'\n  set key bottom right\n", file);
+    write_range(file, 'y', VERTICES, list, points); /* the panel on the right has another, from the form before */
     write_plot(file, list, X_AMPLITUDE, X_VERTICES, "");
     if (!has_minimal) return;
     write_right(file);
-    fputs("  set ylabel 'vertices over those of minimal'\n  set format y '%g'\n  set key top left\n", file);
+    fputs("  set ylabel 'vertices over those of minimal'\n  set format y '%g'\n  set yrange [0.7:*]\n  set key top "
+          "right\n",
+          file);
     write_plot(file, list, X_AMPLITUDE, X_RATIO, "");
     fputs("  unset multiplot\n", file);
 }
 
 static void write_size(FILE *file, const series_list *list) {
     write_left(file);
-    fputs("  set yrange [0:*]\n  set ylabel 'milliseconds'\n  set format y '%g'\n  set key bottom right\n", file);
+    fputs("  set yrange [0:*]\n  set ylabel 'milliseconds'\n  set format y '%g'\n  set key center right\n", file);
     write_times(file, list, X_SIDE);
     write_right(file);
     fputs("  set ylabel 'bytes'\n  set format y '%.0s %cB'\n", file);
@@ -497,7 +507,7 @@ static void write_script(FILE *file, const chart_sheet *sheet, chart_kind kind, 
         write_front(file, &list);
         break;
     case CHART_NOISE:
-        write_noise(file, &list, is_listed(&list, "minimal", strlen("minimal")));
+        write_noise(file, &list, points);
         break;
     case CHART_SIZE:
         write_size(file, &list);

@@ -12,7 +12,7 @@
 #include <string.h>
 
 #define ENOUGH_SECONDS 0.3 /* of runs of one query, after which there is no other */
-enum { MOST_RUNS = 99, FRESH_RUNS = 3 };
+enum { MOST_RUNS = 99 };
 
 /* ----------------------------------------------------------------------------------------------- points -- */
 bool chart_points_add(chart_points *points, const chart_point *point) {
@@ -206,11 +206,10 @@ static chart_answer time_warm(const chart_query *q, const chart_method *method, 
 }
 
 static chart_answer time_fresh(const chart_query *q, const chart_method *method, double eps, chart_point *p) {
-    double times[FRESH_RUNS];
+    double times[MOST_RUNS];
     int runs = 0;
-    const int most = q->runs < FRESH_RUNS ? 1 : FRESH_RUNS;
-    for (const double begin = cli_seconds(); runs < most; runs++) {
-        if (runs && cli_seconds() - begin > ENOUGH_SECONDS) break;
+    for (const double begin = cli_seconds(); runs < q->runs && runs < MOST_RUNS; runs++) {
+        if (runs % 2 && cli_seconds() - begin > ENOUGH_SECONDS) break;
         sqlite3 *db = cli_open(q->path);
         sqlite3_stmt *mesh = db ? prepare(db, MESH, q, method, eps) : NULL;
         chart_answer answer = mesh ? CHART_MEASURED : CHART_BROKEN;

@@ -13,8 +13,7 @@ RQT=${RQT:-$BUILD/rqt}
 OUT=$BUILD/chart
 K=${CHART_K:-13}
 SMALLEST_K=10
-NOISE=${NOISE:-0 0.5 1 2 4 8}
-NOISE_SIDE=1025
+NOISE=${NOISE:-0 0.5 1 1.5 2 2.5 3 3.5 4 5 6 8}
 mkdir -p "$OUT/families"
 [[ -e $RQT ]] || { echo "chart: $RQT is missing; run make first" >&2; exit 2; }
 
@@ -35,8 +34,8 @@ import() { # NAME RASTER COL ROW SIDE
     rm -f "$work"/crop.*
 }
 for amplitude in $NOISE; do
-    "$work/make_terrain" 11 "$work/noise.bin" 1 "$amplitude" # its middle is smoother than a terrain of that size
-    import "fbm_noise_$amplitude" "$work/noise.bin" 512 512 $NOISE_SIDE
+    "$work/make_terrain" 9 "$work/noise.bin" 1 "$amplitude" 100 # hills of 100 m: the noise must show
+    import "fbm_noise_$amplitude" "$work/noise.bin" 0 0 513
     rm -f "$work"/noise.*
 done
 # The middle of every crop is the middle of the whole, and their quadrants nest: the window's mesh is the same in all.

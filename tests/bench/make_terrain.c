@@ -1,13 +1,13 @@
 /* make_terrain.c - terrain for the benches: fractional Brownian motion, the same bytes on every machine.
  *
- *     make_terrain K OUTPUT.bin [SEED [NOISE]]
+ *     make_terrain K OUTPUT.bin [SEED [NOISE [TOP]]]
  *
  * A square of (2^K + 1)^2 samples by midpoint displacement with successive random additions (every point of a
  * lattice is displaced again at every scale, which spares the creases of plain midpoint displacement), H = 0.9,
- * stretched to 0..4000 m and rounded to whole metres. Written as ENVI: raw little-endian int16 and a header beside
- * it; 30 m cells, UTM zone 32 north (EPSG:32632). With NOISE, in metres, every sample is moved by a random height
- * of at most that much, each by its own (white noise, all heights equally likely), and heights are int32
- * centimetres.
+ * stretched to 0..4000 m (or TOP) and rounded to whole metres. Written as ENVI: raw little-endian int16 and a
+ * header beside it; 30 m cells, UTM zone 32 north (EPSG:32632). With NOISE, in metres, every sample is moved by a
+ * random height of at most that much, each by its own (white noise, all heights equally likely), and heights are
+ * int32 centimetres.
  *
  * The same bytes everywhere: additions and multiplications of doubles in a fixed order (compile without fused
  * ones), no function of libm, noise from an integer hash of place and scale.
@@ -19,7 +19,7 @@
 #include <string.h>
 
 #define HALF_STEP 0.7320428479728127 /* 2^(-H/2): what a scale finer by sqrt(2) is weaker by */
-#define TOP 4000.0
+#define USUAL_TOP 4000.0
 #define CELL 30.0
 #define WEST 400000.0
 #define NORTH 5250000.0
@@ -29,6 +29,7 @@ typedef struct field {
     double *z; /* n * n */
     uint64_t seed;
     double noise; /* metres; less than 0: none, and whole metres */
+    double top;   /* metres of the highest sample; the lowest is at 0 */
 } field;
 
 static uint64_t mix(uint64_t h) {
@@ -108,7 +109,7 @@ static int write_samples(const field *f, const char *path) {
         if (f->z[i] < low) low = f->z[i];
         if (f->z[i] > high) high = f->z[i];
     }
-    const double stretch = TOP / (high - low);
+    const double stretch = f->top / (high - low);
     const size_t size = f->noise < 0 ? 2 : 4;
     unsigned char *row = malloc(size * f->n);
     FILE *out = row ? fopen(path, "wb") : NULL;
@@ -149,14 +150,16 @@ static int write_header(const field *f, const char *path) {
 }
 
 int main(int argc, char **argv) {
-    const int k = argc >= 3 && argc <= 5 ? atoi(argv[1]) : 0;
+    const int k = argc >= 3 && argc <= 6 ? atoi(argv[1]) : 0;
     if (k < 1 || k > 15) {
-        fprintf(stderr, "Usage: make_terrain K OUTPUT.bin [SEED [NOISE]]; (2^K + 1)^2 samples, K from 1 to 15\n");
+        fprintf(stderr,
+                "Usage: make_terrain K OUTPUT.bin [SEED [NOISE [TOP]]]; (2^K + 1)^2 samples, K from 1 to 15\n");
         return 2;
     }
     field f = {.n = ((size_t)1 << k) + 1,
                .seed = argc >= 4 ? strtoull(argv[3], NULL, 10) : 1,
-               .noise = argc == 5 ? strtod(argv[4], NULL) : -1};
+               .noise = argc >= 5 ? strtod(argv[4], NULL) : -1,
+               .top = argc == 6 ? strtod(argv[5], NULL) : USUAL_TOP};
     f.z = calloc(f.n * f.n, sizeof *f.z);
     if (!f.z) {
         fprintf(stderr, "make_terrain: out of memory\n");

@@ -56,7 +56,7 @@ const Martini = await load('@mapbox/martini/index.js');
         tile.getMesh(asked);
         const times = [];
         let mesh;
-        for (let run = 0; run < 5; run++) {
+        for (let run = 0, end = performance.now() + 300; run < 5 || (run < 51 && performance.now() < end); run++) {
             const start = performance.now();
             mesh = tile.getMesh(asked);
             times.push(performance.now() - start);
