@@ -373,7 +373,8 @@ static bool shows_fresh(const char *series) {
 }
 
 /* Of a logarithmic axis: what the series have, and a little more. */
-static void write_range(FILE *file, char axis, cell which, const series_list *list, const chart_points *points) {
+static void write_range(FILE *file, const char *axis, cell which, const series_list *list,
+                        const chart_points *points) {
     double low = INFINITY, high = 0;
     for (int i = 0; i < points->count; i++) {
         const chart_point *p = &points->rows[i];
@@ -388,7 +389,7 @@ static void write_range(FILE *file, char axis, cell which, const series_list *li
         if (value > 0) high = fmax(high, value);
         if (value > 0) low = fmin(low, which == FRESH_MS ? p->ms : value);
     }
-    if (low > 0 && low <= high) fprintf(file, "set %crange [%.6g:%.6g]\n", axis, low / 1.25, high * 1.25);
+    if (low > 0 && low <= high) fprintf(file, "set %srange [%.6g:%.6g]\n", axis, low / 1.25, high * 1.25);
 }
 
 static const char EACH_FORM[] =
@@ -456,7 +457,7 @@ static void write_noise(FILE *file, const series_list *list, const chart_points 
     const bool has_minimal = is_listed(list, "minimal", strlen("minimal"));
     if (has_minimal) write_left(file);
     fputs("  set logscale y\n  set ylabel 'vertices'\n  set format y '%.0s%c'\n  set key bottom right\n", file);
-    write_range(file, 'y', VERTICES, list, points); /* the panel on the right has another, from the form before */
+    write_range(file, "y", VERTICES, list, points); /* the panel on the right has another, from the form before */
     write_plot(file, list, X_AMPLITUDE, X_VERTICES, "");
     if (!has_minimal) return;
     write_right(file);
@@ -488,8 +489,9 @@ static void write_script(FILE *file, const chart_sheet *sheet, chart_kind kind, 
     list_series(plan, points, &list);
     const bool is_pair = kind == CHART_NOISE || kind == CHART_SIZE;
     write_head(file, plan);
-    if (plan->x) write_range(file, 'x', plan->x, &list, points);
-    if (plan->y) write_range(file, 'y', plan->y, &list, points);
+    if (plan->x) write_range(file, "x", plan->x, &list, points);
+    if (plan->y) write_range(file, "y", plan->y, &list, points);
+    if (kind == CHART_FRONT) write_range(file, "cb", VERTICES, &list, points);
     write_blocks(file, &list, points);
     fprintf(file, EACH_FORM, is_pair ? 1200 : 1000, is_pair ? 1680 : 1400, plan->name);
     write_headings(file, sheet, plan, is_pair);

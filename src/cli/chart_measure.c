@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define ENOUGH_SECONDS 0.3 /* of runs of one query, after which there is no other */
+#define ENOUGH_SECONDS 0.2 /* of runs of one query, after which there is no other */
 enum { MOST_RUNS = 99 };
 
 /* ----------------------------------------------------------------------------------------------- points -- */

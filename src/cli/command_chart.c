@@ -249,13 +249,18 @@ static int compare_members(const void *a, const void *b) {
     return (x > y) - (x < y);
 }
 
-/* The first family in order of names; a sentence when there are more. How many terrains are in no family goes to
- * *others. */
-static bool find_family(sqlite3 *db, const char *mark, family *f, int *others) {
+/* Terrains in no family. */
+typedef struct loners {
+    int count;
+    char name[64]; /* of the last one */
+} loners;
+
+/* The first family in order of names; a sentence when there are more. */
+static bool find_family(sqlite3 *db, const char *mark, family *f, loners *others) {
     sqlite3_stmt *row = cli_prepare(db, "SELECT name, width, height, x0, y0, x0 + (width - 1) * dx, "
                                         "y0 + (height - 1) * dy FROM rqt_terrains ORDER BY name");
     *f = (family){.count = 0};
-    *others = 0;
+    *others = (loners){.count = 0};
     if (!row) return false;
     bool said = false;
     int code;
@@ -264,7 +269,10 @@ static bool find_family(sqlite3 *db, const char *mark, family *f, int *others) {
         member next = {.side = sqlite3_column_int64(row, 1)};
         size_t stem;
         if (!name) continue;
-        *others += !is_member(name);
+        if (!is_member(name)) {
+            others->count++;
+            snprintf(others->name, sizeof others->name, "%s", name);
+        }
         if (!read_member(name, mark, &next.value, &stem) || stem >= sizeof f->stem || f->count == MOST_MEMBERS)
             continue;
         if (f->count && (strlen(f->stem) != stem || strncmp(f->stem, name, stem))) {
@@ -347,11 +355,12 @@ static bool chart_family(job *j, const family *f, chart_kind kind) {
 /* ------------------------------------------------------------------------------------------------ the whole -- */
 static bool chart(job *j) {
     family noise, size;
-    int others;
+    loners others;
     if (!find_family(j->db, "_noise_", &noise, &others) || !find_family(j->db, "_size_", &size, &others))
         return false;
     find_machine(j->sheet.note);
-    const bool only_families = !j->terrain && !others && (noise.count || size.count);
+    const bool only_families = !j->terrain && !others.count && (noise.count || size.count);
+    if (!j->terrain && others.count == 1) j->terrain = others.name;
     if (only_families)
         cli_say("there are families of terrains only, and no --terrain: charts 1 to 4 are left out");
     else if (!chart_terrain(j))
