@@ -54,6 +54,15 @@ MUTANTS = [
     ("closure: the diagonal of every cell the same", "src/core/lattice.c", ">> (scale + 1)) & 1) == 0;",
      ">> (scale + 1)) & 1) != 2;",
      "test_core_lattice", "parents_children_and_levels_equal_the_oracles_graph"),
+    # other metrics
+    ("minimal: one pass is enough", "src/core/minimal.c", "} while (f.changed);", "} while (0);",
+     "test_core_metric", "minimal_errors_select_what_splitting_bad_leaves_gives"),
+    ("minimal: a leaf that is not there is split", "src/core/minimal.c", "least(f->deviation[2 * at], apex0)", "f->deviation[2 * at]",
+     "test_core_metric", "no_mesh_of_5_by_5_is_smaller_or_nearer_within_its_size"),
+    ("wedgie: no bound at the raster's edge", "src/core/metric.c", "nested > least ? nested : least", "nested + 0 * least",
+     "test_core_metric", "local_wedgie_and_euclid_are_their_definitions"),
+    ("fans: a clockwise run begins where others do", "src/core/strip_fans.c", "(odd ? 1u : 0u)", "(0u * odd)",
+     "test_core_fans", "every_metric_answers_alike_by_all_ways_and_blocks"),
     # far heights and the interval pyramid
     ("far: the near corner instead", "src/core/pyramid.c", "summary_vertex(p, 2 * ax - cx, cy)", "summary_vertex(p, ax, cy)",
      "test_core_query", "blocks_and_summaries_hold_what_the_oracle_says"),

@@ -81,7 +81,6 @@ for c in update serve; do refuses "rqt $c is for later" 2 "not in this version" 
 # ------------------------------------------------------------------------------------------------------- import
 refuses "import: nothing" 2 "a source and a database are missing" import
 refuses "import: no database" 2 "the database is missing" import hill.asc
-refuses "import: --minimal is for later" 2 "--minimal is not in this version" import --minimal hill.asc x.gpkg
 refuses "import: --block 9" 2 "--block 9: K is a whole number from 1 to 8" import --block 9 hill.asc x.gpkg
 refuses "import: --block 5x" 2 "--block 5x" import --block 5x hill.asc x.gpkg
 refuses "import: --block without a value" 2 "the option --block needs a value" import hill.asc x.gpkg --block

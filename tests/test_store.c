@@ -576,7 +576,8 @@ static void every_way_of_selecting_gives_one_mesh_and_reads_tell_which_blocks(vo
     for (int n = 0; n < 5; n++) {
         for (int outline = 0; outline < 2; outline++) {
             store_reads reads;
-            store_query_options options = {.select = RQT_SELECT_THRESHOLD, .outline = outline ? RQT_OUTLINE_TOL : RQT_OUTLINE_EXACT};
+            store_query_options options = {.select = RQT_SELECT_THRESHOLD,
+                                           .outline = outline ? RQT_OUTLINE_TOL : RQT_OUTLINE_EXACT};
             const answer a = query_store(s, "t", eps[n], options, &reads);
             CHECK(a.code == SQLITE_OK, "eps %g: %s", eps[n], a.error);
             assert_true(reads.count > 0);

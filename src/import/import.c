@@ -155,6 +155,16 @@ static bool check_memory(const import_work *m) {
     double kept = n * sizeof(int32_t) + n + (double)rqt_errors_bytes(&m->mosaic.lattice);
     double writing =
         kept + blocks * 64 + (double)import_blocks_bytes(m->k, m->job.options->jobs) + IMPORT_PAGE_CACHE_BYTES;
+    if (m->job.options->minimal) {
+        const double minimal = (double)store_minimal_bytes(&m->mosaic.lattice, m->k, true);
+        if (minimal > (double)STORE_METHOD_MEMORY)
+            return import_refuse(&m->job,
+                                 "%d x %d samples: their minimal errors take %.0f MiB of memory, and %.0f are "
+                                 "allowed; import without --minimal",
+                                 m->mosaic.lattice.width, m->mosaic.lattice.height, ceil(minimal / MIB),
+                                 (double)STORE_METHOD_MEMORY / MIB);
+        writing += minimal;
+    }
     double need = PROCESS_BYTES + (reading > writing ? reading : writing);
     if (need <= (double)m->job.options->memory) return true;
     return import_refuse(&m->job, "%d x %d samples need %.0f MiB of memory to import; --memory allows %.0f",
@@ -238,6 +248,18 @@ static rqt_code largest_error(const rqt_errors *errors) {
     return largest;
 }
 
+static bool minimal_progress(void *context, double done) {
+    const import_work *m = context;
+    return import_progress(&m->job, "minimal errors", done, sample_count(m));
+}
+
+static bool write_minimal(import_work *m) {
+    char *detail = NULL;
+    const int code = store_write_minimal(m->database.db, m->report->name, minimal_progress, m, &detail);
+    if (code == SQLITE_INTERRUPT) return false;
+    return code == SQLITE_OK || import_database_refuse(&m->job, code, detail);
+}
+
 /* File names, one a line. */
 static char *provenance(const import_work *m) {
     size_t size = 1;
@@ -269,6 +291,7 @@ static bool write_terrain(import_work *m, store_terrain *info) {
     }
     store_writer_free(writer);
     rqt_pyramid_free(pyramid);
+    if (ok && job->options->minimal) ok = write_minimal(m);
     return ok && import_database_commit(job, &m->database);
 }
 

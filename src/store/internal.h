@@ -82,6 +82,14 @@ int64_t store_count_selected(const rqt_query *query, const rqt_block *block);
 bool store_is_interrupted(store *s, int *code);
 
 #define STORE_MINIMAL "_minimal" /* suffix of the tables that hold minimal errors */
+/* A writer of those tables, beside a terrain of main that is complete. writer.c */
+int store_writer_beside(sqlite3 *db, const store_terrain *t, store_writer **writer, char **error);
+/* The pyramid over a metric's errors, computed now if need be; valid until the store forgets. methods.c */
+int store_take_pyramid(store *s, const store_terrain *t, rqt_metric metric, rqt_outline outline,
+                       const rqt_pyramid **pyramid, char **error);
+/* What rqt_check finds of the minimal errors of a terrain, as store_check. minimal.c */
+int store_check_minimal(store *s, const store_terrain *t, bool (*tell)(void *context, const store_finding *finding),
+                        void *context, char **error);
 /* The terrain as the tables of its minimal errors have it; NULL when it has none. minimal.c */
 const store_terrain *store_minimal(store *s, const store_terrain *t);
 

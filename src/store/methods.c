@@ -90,12 +90,17 @@ static size_t kept_bytes(const struct method_cache *c) {
     return bytes;
 }
 
-size_t store_method_bytes(const store_terrain *t, rqt_metric metric) {
+static size_t method_bytes(const store_terrain *t, rqt_metric metric) {
     return grid_bytes(t) + pyramid_bytes(t) + rqt_metric_bytes(&t->lattice, metric);
 }
 
+size_t store_minimal_bytes(const rqt_lattice *lattice, int k, bool has_voids) {
+    const store_terrain t = {.lattice = *lattice, .k = k, .voids = has_voids};
+    return method_bytes(&t, RQT_METRIC_MINIMAL);
+}
+
 /* All samples, by rows of blocks. */
-int store_read_grid(store *s, const store_terrain *t, int32_t **q, uint8_t **valid, rqt_grid *grid, char **error) {
+static int read_grid(store *s, const store_terrain *t, int32_t **q, uint8_t **valid, rqt_grid *grid, char **error) {
     const int32_t width = t->lattice.width, height = t->lattice.height, rows = 1 << t->k;
     const size_t n = (size_t)width * (size_t)height;
     *q = sqlite3_malloc64(n * sizeof **q);
@@ -135,7 +140,7 @@ static int take_grid(store *s, const store_terrain *t, char **error) {
     if (!c) return SQLITE_NOMEM;
     memset(c, 0, sizeof *c);
     c->terrain = terrain;
-    const int code = store_read_grid(s, t, &c->q, &c->valid, &c->grid, error);
+    const int code = read_grid(s, t, &c->q, &c->valid, &c->grid, error);
     if (code != SQLITE_OK) {
         sqlite3_free(c);
         return code;
@@ -190,7 +195,7 @@ static int compute(store *s, const store_terrain *t, const rqt_grid *grid, rqt_m
 static int take_method(store *s, const store_terrain *t, rqt_metric metric, rqt_outline outline, method **out,
                        char **error) {
     const int which = metric == RQT_METRIC_MINIMAL && outline == RQT_OUTLINE_TOL;
-    const size_t need = store_method_bytes(t, metric);
+    const size_t need = method_bytes(t, metric);
     if (need > s->method_memory)
         return store_fail(error, SQLITE_ERROR,
                           "metric \"%s\" of terrain %s is not stored, and computing it takes %llu MiB of memory; "
@@ -205,6 +210,14 @@ static int take_method(store *s, const store_terrain *t, rqt_metric metric, rqt_
         code = compute(s, t, &s->methods->grid, metric, outline, kept, error);
     }
     *out = *kept;
+    return code;
+}
+
+int store_take_pyramid(store *s, const store_terrain *t, rqt_metric metric, rqt_outline outline,
+                       const rqt_pyramid **pyramid, char **error) {
+    method *m = NULL;
+    const int code = take_method(s, t, metric, outline, &m, error);
+    if (code == SQLITE_OK) *pyramid = m->pyramid;
     return code;
 }
 

@@ -142,6 +142,14 @@ int store_writer_finish(store_writer *w, rqt_code max_error, char **error);
 /* Release, finished or not. */
 void store_writer_free(store_writer *w);
 
+/* Store the minimal errors of a terrain of main that is complete, so that queries need not compute them: in tables
+ * like its own (FORMAT.md, "Tables"), inside the caller's transaction. All heights are read back: what that takes
+ * (store_minimal_bytes) must be within STORE_METHOD_MEMORY, else SQLITE_ERROR with a sentence and nothing written.
+ * progress, when not NULL, returns false to stop (SQLITE_INTERRUPT; the caller rolls back). */
+int store_write_minimal(sqlite3 *db, const char *name, bool (*progress)(void *context, double done), void *context,
+                        char **error);
+size_t store_minimal_bytes(const rqt_lattice *lattice, int k, bool has_voids);
+
 /* Is this a name a terrain may have? */
 bool store_name_is_valid(const char *name);
 
