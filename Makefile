@@ -168,7 +168,7 @@ chart: ## speed against accuracy, drawn: pictures in build/chart; peers from npm
 	@./src/install-packages.sh build test
 	@./src/install-packages.sh peers || echo "No node: the charts go without peers" >&2
 	@$(MAKE) --no-print-directory -j2 products
-	@BUILD=$(BUILD) DATA="$(if $(filter command% environment%,$(origin DATA)),$(DATA))" ./tests/bench/chart.sh
+	@BUILD=$(BUILD) DATA="$(if $(filter command% environment%,$(origin DATA)),$(DATA))" DOCS=$(DOCS) ./tests/bench/chart.sh
 peers: ## vertices at equal true error beside a greedy TIN and RTIN, for six DEMs of DATA=dir
 	@./src/install-packages.sh build test
 	@./src/install-packages.sh peers || echo "No node: the table goes without peers" >&2

@@ -381,7 +381,7 @@ if command -v gnuplot >/dev/null; then
     ok "gnuplot has nothing to say" $? "$(cat err)"
     for name in 1-error-vertices 2-error-eps 3-time-error 4-front 5-noise 6-size; do
         read -r w h <<<"$(size_of f/$name.png)"
-        [ "$w" -ge 1400 ] && [ "$h" = 896 ] && tail -c 8 f/$name.svg | grep -q '</svg>'; ok "chart: $name.png and .svg" $? "$w x $h"
+        [ "$w" -ge 1100 ] && [ "$h" = 704 ] && tail -c 8 f/$name.svg | grep -q '</svg>'; ok "chart: $name.png and .svg" $? "$w x $h"
     done
 fi
 printf 'ncols 5\nnrows 5\nxllcorner 0\nyllcorner 0\ncellsize 1\n%s' "$(for i in 1 2 3 4 5; do echo 7 7 7 7 7; done)" >flat.asc

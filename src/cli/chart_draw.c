@@ -298,8 +298,9 @@ static void write_line(FILE *file, const char *name) {
     const look *l = look_of(name);
     const char *slash = strchr(name, '/');
     const int dash = !slash ? 1 : slash[1] == 't' ? 2 : 3;
-    fprintf(file, "with linespoints lc rgb '%s' lw %s pt %d ps 0.8 dt %d", l->colour,
-            !strcmp(name, "exact") ? "2.5" : "1.6", slash ? l->point - 1 : l->point, dash);
+    fprintf(file, "with linespoints lc rgb '%s' lw %s pt %d ps %s dt %d", l->colour,
+            !strcmp(name, "exact") ? "4" : "1.6", slash ? l->point - 1 : l->point,
+            !strcmp(name, "exact") ? "1.2" : "0.8", dash);
 }
 
 /* ---------------------------------------------------------------------------------------------- scripts -- */
@@ -395,7 +396,8 @@ static void write_range(FILE *file, const char *axis, cell which, const series_l
 static const char EACH_FORM[] =
     "\ndo for [form in 'svg png'] {\n"
     "  if (form eq 'svg') { set terminal svg size %d,640 dynamic font 'DejaVu Sans,12' background '#ffffff' }\n"
-    "  else { set terminal pngcairo size %d,896 font 'DejaVu Sans,12' fontscale 1.3 linewidth 1.4 pointscale 1.4 "
+    "  else { set terminal pngcairo size %d,704 font 'DejaVu Sans,12' fontscale 1.02 linewidth 1.15 pointscale "
+    "1.15 "
     "}\n"
     "  set output '%s.'.form\n";
 
@@ -493,7 +495,7 @@ static void write_script(FILE *file, const chart_sheet *sheet, chart_kind kind, 
     if (plan->y) write_range(file, "y", plan->y, &list, points);
     if (kind == CHART_FRONT) write_range(file, "cb", VERTICES, &list, points);
     write_blocks(file, &list, points);
-    fprintf(file, EACH_FORM, is_pair ? 1200 : 1000, is_pair ? 1680 : 1400, plan->name);
+    fprintf(file, EACH_FORM, is_pair ? 1200 : 1000, is_pair ? 1320 : 1100, plan->name);
     write_headings(file, sheet, plan, is_pair);
     switch (kind) {
     case CHART_ERROR_VERTICES:

@@ -5,7 +5,8 @@
 # they can be had (peers.sh), and the table of vertices at equal true error. Charts 5 and 6 of two generated families: one
 # terrain under more and more white noise, and crops of one terrain that grow around the same window.
 #   CHART_K=13      the largest terrain of the family of sizes has 2^K + 1 samples a side
-#   NOISE=0,...     amplitudes in metres
+#   NOISE="0 ..."   amplitudes in metres
+#   DOCS=dir        copy the pictures there, as NAME-CHART.png (examples/charts, for examples/CHARTS.md)
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 BUILD=${BUILD:-build}
@@ -45,4 +46,11 @@ for ((k = SMALLEST_K; k <= K; k++)); do
     import "fbm_size_$(((1 << k) + 1))" "$work/whole.bin" $from $from $(((1 << k) + 1))
 done
 "$RQT" chart "$families" -o "$OUT/families" --runs 25
+if [[ -n ${DOCS:-} ]]; then
+    mkdir -p "$DOCS"
+    for picture in "$OUT"/*/[1-6]-*.png; do
+        folder=$(basename "$(dirname "$picture")")
+        cp "$picture" "$DOCS/$folder-$(basename "$picture")"
+    done
+fi
 echo "The charts: $OUT/*/*.png"
