@@ -160,7 +160,7 @@ def main():
         (shutil.copytree if os.path.isdir(name) else shutil.copy2)(name, os.path.join(tree, name))
     # Objects are up to date with the sources they came from: times are kept.
     shutil.copytree(build, os.path.join(tree, "build"),
-                    ignore=shutil.ignore_patterns("mutants", "sanitized", "bench", "demo", "*.log"))
+                    ignore=shutil.ignore_patterns("mutants", "sanitized", "bench", "chart", "peers", "demo", "*.log"))
     environment = dict(os.environ, RQT_SEED="1", TMPDIR=os.path.abspath(tree))
     caught = missed = 0
     for what, path, old, new, program, test in MUTANTS:
