@@ -167,7 +167,8 @@ void store_reads_free(store_reads *reads) {
 }
 
 static int query(store *s, const store_terrain *t, const rqt_region *region, double eps,
-                 const store_query_options *options, rqt_patch *patch, store_reads *reads, char **error) {
+                 const store_query_options *options, bool wants_leaves, rqt_patch *patch, store_reads *reads,
+                 char **error) {
     memset(patch, 0, sizeof *patch);
     if (reads) memset(reads, 0, sizeof *reads);
     if (!(eps >= 0)) return store_fail(error, SQLITE_ERROR, "eps must be a number of metres, 0 or more");
@@ -184,6 +185,7 @@ static int query(store *s, const store_terrain *t, const rqt_region *region, dou
                            .eps = code_eps,
                            .select = options->select,
                            .outline = options->outline,
+                           .wants_leaves = wants_leaves,
                            .answers = list.rows,
                            .answer_count = list.count,
                            .read_block = read_block,
@@ -206,13 +208,24 @@ static int query(store *s, const store_terrain *t, const rqt_region *region, dou
     return code;
 }
 
-int store_query(store *s, const store_terrain *t, const rqt_region *region, double eps,
-                const store_query_options *options, rqt_patch *patch, store_reads *reads, char **error) {
+static int begin_and_query(store *s, const store_terrain *t, const rqt_region *region, double eps,
+                           const store_query_options *options, bool wants_leaves, rqt_patch *patch,
+                           store_reads *reads, char **error) {
     memset(patch, 0, sizeof *patch);
     if (reads) memset(reads, 0, sizeof *reads);
     int code = store_begin_on(s, t, error);
     if (code != SQLITE_OK) return code;
-    code = query(s, t, region, eps, options, patch, reads, error);
+    code = query(s, t, region, eps, options, wants_leaves, patch, reads, error);
     store_end(s);
     return code;
+}
+
+int store_query(store *s, const store_terrain *t, const rqt_region *region, double eps,
+                const store_query_options *options, rqt_patch *patch, store_reads *reads, char **error) {
+    return begin_and_query(s, t, region, eps, options, false, patch, reads, error);
+}
+
+int store_query_leaves(store *s, const store_terrain *t, const rqt_region *region, double eps,
+                       const store_query_options *options, rqt_patch *patch, store_reads *reads, char **error) {
+    return begin_and_query(s, t, region, eps, options, true, patch, reads, error);
 }

@@ -93,6 +93,9 @@ void store_reads_free(store_reads *reads);
 /* The patch of region at eps (metres; checked here: NaN and negative are SQLITE_ERROR). reads may be NULL. */
 int store_query(store *s, const store_terrain *t, const rqt_region *region, double eps,
                 const store_query_options *options, rqt_patch *patch, store_reads *reads, char **error);
+/* The same, and the leaves of the patch by lattice vertices. */
+int store_query_leaves(store *s, const store_terrain *t, const rqt_region *region, double eps,
+                       const store_query_options *options, rqt_patch *patch, store_reads *reads, char **error);
 /* Full-resolution samples of a window inside the raster, for width*height values each, row by row. */
 int store_window(store *s, const store_terrain *t, int32_t col, int32_t row, int32_t width, int32_t height,
                  int32_t *q, uint8_t *valid, char **error);
