@@ -62,7 +62,7 @@ static blob blob_of(const uint8_t *bytes, size_t size) {
     return b;
 }
 
-static blob encode(const answer *a, const answer *from) {
+static blob encode_as(const answer *a, const answer *from, const char *what) {
     const size_t bound = rqt_wire_bound(a->patch.vertex_count, a->patch.triangle_count, a->count);
     rqt_wire_header header = a->header;
     uint8_t *bytes = malloc(bound);
@@ -71,11 +71,15 @@ static blob encode(const answer *a, const answer *from) {
     if (from) header.eps_from = from->header.eps;
     const rqt_status status = rqt_wire_encode(&header, a->numbers, a->count, &a->patch, from ? &from->patch : NULL,
                                               &test_allocator, bytes, &size);
-    CHECK(status == RQT_OK, "encode: status %d", (int)status);
+    CHECK(status == RQT_OK, "%s: encode: status %d", what, (int)status);
     CHECK(size <= bound, "%zu bytes, bound %zu", size, bound);
     blob b = blob_of(bytes, size);
     free(bytes);
     return b;
+}
+
+static blob encode(const answer *a, const answer *from) {
+    return encode_as(a, from, "a mesh");
 }
 
 static void check_same_patch(const rqt_patch *a, const rqt_patch *b, const char *what) {
@@ -110,7 +114,7 @@ static void check_header(const rqt_wire_header *h, const answer *a) {
 }
 
 static void check_round_trip(const answer *a, const char *what) {
-    blob b = encode(a, NULL);
+    blob b = encode_as(a, NULL, what);
     for (int leaves = 0; leaves < 2; leaves++) {
         rqt_wire_header header;
         rqt_patch patch;
@@ -207,7 +211,7 @@ static void check_chain(const model *m, database *d, const rqt_region *region, r
     for (int i = 1; i < 6; i++) {
         if (random_between(0, 4) == 0 && i < 5) continue;
         answer then = ask(d, m, region, eps[i], outline);
-        b = encode(&then, &now);
+        b = encode_as(&then, &now, what);
         const rqt_status status =
             rqt_wire_apply(&header, &patch, b.bytes, b.size, &test_allocator, &finer, &next, &why);
         CHECK(status == RQT_OK, "%s: eps code %d: status %d, %s", what, eps[i], (int)status, why.text);
@@ -286,11 +290,11 @@ static void increments_that_belong_elsewhere_are_refused_with_a_reason(void **st
     const long box[4] = {3 * ORACLE_UNITS, 3 * ORACLE_UNITS, 20 * ORACLE_UNITS, 21 * ORACLE_UNITS};
     window all = window_all(), part = window_of(box);
     rqt_region *whole = region_of(&all, &m.grid.lattice), *some = region_of(&part, &m.grid.lattice);
-    const rqt_code middle = rqt_code_eps(rqt_unit_factor(&m.r.unit) < 0 ? 5 : 5, 0);
+    const rqt_code middle = (rqt_code)(oracle_at(&m.o, 10, 10)->code - 1);
     answer coarse = ask(&d, &m, whole, RQT_CODE_LARGEST, RQT_OUTLINE_EXACT),
-           window_coarse = ask(&d, &m, some, RQT_CODE_LARGEST, RQT_OUTLINE_EXACT),
+           window_between = ask(&d, &m, some, middle, RQT_OUTLINE_EXACT),
            fine = ask(&d, &m, whole, 0, RQT_OUTLINE_EXACT), between = ask(&d, &m, whole, middle, RQT_OUTLINE_EXACT);
-    blob delta = encode(&fine, &coarse), mesh = encode(&fine, NULL);
+    blob delta = encode(&fine, &coarse), later = encode(&fine, &between), mesh = encode(&fine, NULL);
     rqt_wire_header header, out;
     rqt_patch patch;
     rqt_message why;
@@ -300,7 +304,7 @@ static void increments_that_belong_elsewhere_are_refused_with_a_reason(void **st
         const rqt_patch *state;
         const blob *bytes;
     } cases[] = {
-        {"another region", window_coarse.header, &window_coarse.patch, &delta},
+        {"another region", window_between.header, &window_between.patch, &later},
         {"another eps", between.header, &between.patch, &delta},
         {"another terrain", coarse.header, &coarse.patch, &delta},
         {"another terrain", coarse.header, &coarse.patch, &delta},
@@ -343,9 +347,10 @@ static void increments_that_belong_elsewhere_are_refused_with_a_reason(void **st
                      RQT_INVALID);
     free(room);
     free(delta.bytes);
+    free(later.bytes);
     free(mesh.bytes);
     answer_free(&coarse);
-    answer_free(&window_coarse);
+    answer_free(&window_between);
     answer_free(&fine);
     answer_free(&between);
     rqt_region_free(whole);

@@ -92,6 +92,10 @@ static uint8_t decide_slowly(wire_walk *w, uint32_t a, uint32_t l, uint32_t r, u
 }
 
 static inline uint8_t decide(wire_walk *w, uint32_t a, uint32_t l, uint32_t r, uint32_t m, int splits) {
+    if (w->state[m] == WIRE_GUESS) { /* split by a triangle that is in the patch in part */
+        settle(w, m, false);
+        return w->state[m];
+    }
     const int stream = WIRE_BY_CLASS + WIRE_PER_CLASS * (2 * w->shift + splits - 1);
     if (w->kind[m] || w->prior.size) return decide_slowly(w, a, l, r, m, stream);
     const uint32_t across = l + r - a;
@@ -121,7 +125,7 @@ static void walk_full(wire_walk *w, uint32_t a, uint32_t l, uint32_t r, int spli
     if (splits > 0) {
         const uint32_t m = (l + r) / 2;
         uint8_t state = w->state[m];
-        if (state < WIRE_NOT) state = decide(w, a, l, r, m, splits);
+        if (state != WIRE_NOT && state != WIRE_VERTEX) state = decide(w, a, l, r, m, splits);
         if (!step_expects(w, a, l, r, state > WIRE_NOT)) return;
         if (state > WIRE_NOT) {
             walk_full(w, m, l, a, splits - 1, clockwise ^ WIRE_CLOCKWISE);
@@ -144,7 +148,7 @@ static void walk_clamped(wire_walk *w, uint32_t a, uint32_t l, uint32_t r, int s
     if (splits > 0) {
         const uint32_t m = (l + r) / 2;
         uint8_t state = w->state[m];
-        if (state < WIRE_NOT) state = decide(w, a, l, r, m, splits);
+        if (state != WIRE_NOT && state != WIRE_VERTEX) state = decide(w, a, l, r, m, splits);
         if (!step_expects(w, a, l, r, state > WIRE_NOT)) return;
         if (state > WIRE_NOT) {
             walk_clamped(w, m, l, a, splits - 1, clockwise ^ WIRE_CLOCKWISE);
