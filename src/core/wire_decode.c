@@ -39,11 +39,10 @@ static inline int32_t step_height(wire_walk *w, int stream, uint32_t p, int32_t 
     const uint8_t token = s->p[s->at++];
     uint32_t v = d->base[token];
     (void)p;
-    if (token >= 64) {
-        const int bits = d->bits[token];
-        v += (uint32_t)(get64(raw->p + (raw->at >> 3)) >> (raw->at & 7)) & ((1U << bits) - 1);
-        raw->at += (size_t)bits;
-    }
+    /* For most tokens no bits: but a branch costs more than reading them. */
+    const int bits = d->bits[token];
+    v += (uint32_t)(get64(raw->p + (raw->at >> 3)) >> (raw->at & 7)) & ((1U << bits) - 1);
+    raw->at += (size_t)bits;
     const int32_t residual = (int32_t)(v >> 1 ^ (0 - (v & 1)));
     const int64_t q = (int64_t)guess + residual;
     if (q > -RQT_HEIGHT_LIMIT && q < RQT_HEIGHT_LIMIT) return (int32_t)q;

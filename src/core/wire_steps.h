@@ -48,17 +48,18 @@ static void settle(wire_walk *w, uint32_t p, bool even_rim) {
     remember(w, p);
 }
 
-/* The height of a split vertex inside the raster, from its diamond. */
+/* The height of a split vertex inside the raster: from its diamond when the apex across is a vertex with a height.
+ * Which it is is a matter of chance, so no branch. */
 static inline void predict(wire_walk *w, uint32_t l, uint32_t r, uint32_t m, uint32_t a, uint32_t across, bool pair,
                            int stream) {
-    const int64_t ends = (int64_t)w->q[l] + w->q[r];
-    const int32_t guess = pair ? (int32_t)((ends + w->q[a] + w->q[across]) >> 2) : (int32_t)(ends >> 1);
-    w->q[m] = step_height(w, stream + (pair ? WIRE_TOKEN_PAIR : WIRE_TOKEN_LONE), m, guess);
+    const int64_t ends = (int64_t)w->q[l] + w->q[r], apexes = (int64_t)w->q[a] + w->q[across];
+    const int64_t four = pair ? ends + apexes : 2 * ends;
+    w->q[m] = step_height(w, stream + WIRE_TOKEN_LONE + pair, m, (int32_t)(four >> 2));
     w->state[m] = WIRE_VERTEX;
 }
 
 /* Is the split vertex m, on a side, on the rim or perhaps known beforehand, a vertex? */
-static uint8_t decide_slowly(wire_walk *w, uint32_t a, uint32_t l, uint32_t r, uint32_t m, int stream) {
+static int decide_slowly(wire_walk *w, uint32_t a, uint32_t l, uint32_t r, uint32_t m, int stream) {
     const uint8_t kind = w->kind[m];
     const bool inside = !(kind & WIRE_EDGE);
     const uint32_t across = inside ? l + r - a : 0;
@@ -91,25 +92,34 @@ static uint8_t decide_slowly(wire_walk *w, uint32_t a, uint32_t l, uint32_t r, u
     return w->state[m];
 }
 
-static inline uint8_t decide(wire_walk *w, uint32_t a, uint32_t l, uint32_t r, uint32_t m, int splits) {
-    if (w->state[m] == WIRE_GUESS) { /* split by a triangle that is in the patch in part */
+/* Is the triangle, whose split vertex is m, split? state: of m. */
+static inline bool decide(wire_walk *w, uint32_t a, uint32_t l, uint32_t r, uint32_t m, int splits, int state) {
+    const int stream = w->streams + WIRE_PER_CLASS * splits;
+    if (state == WIRE_GUESS) { /* split by a triangle that is in the patch in part */
         settle(w, m, false);
-        return w->state[m];
+        return true;
     }
-    const int stream = WIRE_BY_CLASS + WIRE_PER_CLASS * (2 * w->shift + splits - 1);
-    if (w->kind[m] || w->prior.size) return decide_slowly(w, a, l, r, m, stream);
+    if (w->kind[m] || w->prior.size) return decide_slowly(w, a, l, r, m, stream) > WIRE_NOT;
     const uint32_t across = l + r - a;
-    const uint8_t other = w->state[across];
+    const int other = w->state[across];
     const bool pair = other > WIRE_NOT;
-    if (w->state[m] == WIRE_UNKNOWN) {
-        if (other == WIRE_NOT || !step_split(w, stream + (pair ? WIRE_BITS_PAIR : WIRE_BITS_LONE), a, l, r))
-            return w->state[m] = WIRE_NOT;
+    if (state == WIRE_UNKNOWN) {
+        if (other == WIRE_NOT || !step_split(w, stream + WIRE_BITS_LONE + pair, a, l, r)) {
+            w->state[m] = WIRE_NOT;
+            return false;
+        }
     } else if (other == WIRE_NOT) {
         w->bad = true; /* what depends on m is a vertex, and what m depends on is not */
     }
-    if (other == WIRE_UNKNOWN) w->state[across] = WIRE_FORCED;
+    w->state[across] = (uint16_t)(other | (other == WIRE_UNKNOWN)); /* WIRE_FORCED */
     predict(w, l, r, m, a, across, pair, stream);
-    return WIRE_VERTEX;
+    return true;
+}
+
+static inline bool is_split(wire_walk *w, uint32_t a, uint32_t l, uint32_t r, uint32_t m, int splits) {
+    const int state = w->state[m];
+    if (state == WIRE_VERTEX) return true;
+    return state != WIRE_NOT && decide(w, a, l, r, m, splits, state);
 }
 
 static inline void push_leaf(wire_walk *w, uint32_t a, uint32_t l, uint32_t r, uint32_t clockwise) {
@@ -122,16 +132,18 @@ static inline void push_leaf(wire_walk *w, uint32_t a, uint32_t l, uint32_t r, u
 
 /* A triangle that is in the patch as a whole. splits: how often it can be split on the block's grid. */
 static void walk_full(wire_walk *w, uint32_t a, uint32_t l, uint32_t r, int splits, uint32_t clockwise) {
-    if (splits > 0) {
+    while (splits > 0) {
         const uint32_t m = (l + r) / 2;
-        uint8_t state = w->state[m];
-        if (state != WIRE_NOT && state != WIRE_VERTEX) state = decide(w, a, l, r, m, splits);
-        if (!step_expects(w, a, l, r, state > WIRE_NOT)) return;
-        if (state > WIRE_NOT) {
-            walk_full(w, m, l, a, splits - 1, clockwise ^ WIRE_CLOCKWISE);
-            walk_full(w, m, a, r, splits - 1, clockwise ^ WIRE_CLOCKWISE);
-            return;
-        }
+        const bool split = is_split(w, a, l, r, m, splits);
+        if (!step_expects(w, a, l, r, split)) return;
+        if (!split) break;
+        clockwise ^= WIRE_CLOCKWISE;
+        if (--splits == 0)
+            push_leaf(w, m, l, a, clockwise);
+        else
+            walk_full(w, m, l, a, splits, clockwise);
+        l = a; /* and on with the second child */
+        a = m;
     }
     push_leaf(w, a, l, r, clockwise);
 }
@@ -147,10 +159,9 @@ static void walk_clamped(wire_walk *w, uint32_t a, uint32_t l, uint32_t r, int s
     if (is_flat(w, a, l, r)) return;
     if (splits > 0) {
         const uint32_t m = (l + r) / 2;
-        uint8_t state = w->state[m];
-        if (state != WIRE_NOT && state != WIRE_VERTEX) state = decide(w, a, l, r, m, splits);
-        if (!step_expects(w, a, l, r, state > WIRE_NOT)) return;
-        if (state > WIRE_NOT) {
+        const bool split = is_split(w, a, l, r, m, splits);
+        if (!step_expects(w, a, l, r, split)) return;
+        if (split) {
             walk_clamped(w, m, l, a, splits - 1, clockwise ^ WIRE_CLOCKWISE);
             walk_clamped(w, m, a, r, splits - 1, clockwise ^ WIRE_CLOCKWISE);
             return;

@@ -81,7 +81,7 @@ rqt_status wire_walk_create(wire_walk *w, const rqt_lattice *lattice, int k, con
     const size_t places = (size_t)w->n * (size_t)w->n + 2;
     w->memo = memory_take(allocator, places * sizeof *w->memo);
     w->q = memory_take(allocator, places * sizeof *w->q);
-    w->state = memory_take(allocator, places);
+    w->state = memory_take(allocator, places * sizeof *w->state);
     w->kind = memory_take(allocator, places);
     w->column = memory_take(allocator, places * sizeof *w->column);
     w->row = memory_take(allocator, places * sizeof *w->row);
@@ -133,6 +133,7 @@ bool wire_block_begin(wire_walk *w, const rqt_block_place *place) {
     const size_t places = (size_t)w->n * (size_t)w->n;
     w->place = *place;
     w->shift = __builtin_ctz((unsigned)place->stride);
+    w->streams = WIRE_BY_CLASS + WIRE_PER_CLASS * (2 * w->shift - 1);
     w->u_rim = first_on_rim(place->x, w->shift, w->lattice.width - 1, w->n);
     w->v_rim = first_on_rim(place->y, w->shift, w->lattice.height - 1, w->n);
     w->clamped = w->u_rim < w->n || w->v_rim < w->n;
@@ -141,7 +142,7 @@ bool wire_block_begin(wire_walk *w, const rqt_block_place *place) {
         w->kind_is_plain = !w->clamped;
     }
     memset(w->memo, 0xFF, places * sizeof *w->memo);
-    memset(w->state, WIRE_UNKNOWN, places);
+    memset(w->state, WIRE_UNKNOWN, places * sizeof *w->state);
     return wire_table_reserve(&w->allocator, &w->table, w->clamped ? places + 2 : 4 * (size_t)w->n + 2);
 }
 

@@ -96,13 +96,15 @@ typedef struct wire_walk {
     int32_t last_q;   /* the last height without a prediction */
     /* the block at hand */
     rqt_block_place place;
+    int streams;            /* number of its first stream for a triangle that can be split 0 times */
     int shift;              /* log2 of its stride */
     int32_t u_rim, v_rim;   /* first column and row of its grid at or past the last sample */
     bool clamped;           /* some of them are past it */
     rqt_vertex far[2];      /* of the places n*n and n*n + 1 */
     uint32_t *memo;         /* by place: index in the patch, or WIRE_NONE */
     int32_t *q;             /* by place */
-    uint8_t *state, *kind;  /* by place */
+    uint16_t *state;        /* by place; not bytes, which a compiler thinks may be anything */
+    uint8_t *kind;          /* by place */
     uint16_t *column, *row; /* by place, in strides */
     uint8_t *scale;         /* by place: log2 of its step in strides */
     bool kind_is_plain;     /* kind is as in a block that is not clamped */
