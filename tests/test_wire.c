@@ -442,7 +442,7 @@ static void mutate(const blob *b, const answer *from, int rounds) {
                 const size_t at = random_between(0, 2) ? (size_t)(random_bits() % size)
                                                        : (size_t)random_between(0, size < 80 ? (int)size - 1 : 79);
                 changed[at] =
-                    random_between(0, 1) ? (uint8_t)random_bits() : (uint8_t)(changed[at] ^ 1 << (n / 2) % 8);
+                    random_between(0, 1) ? (uint8_t)random_bits() : (uint8_t)(changed[at] ^ (1 << (n / 2) % 8));
             }
             if (random_between(0, 5) == 0) length = (size_t)(random_bits() % size) + 1;
             copy = with_payload(b, changed, length);
@@ -451,7 +451,7 @@ static void mutate(const blob *b, const answer *from, int rounds) {
             const size_t at =
                 random_between(0, 1) ? (size_t)(random_bits() % head) : (size_t)(random_bits() % copy.size);
             copy.bytes[at] =
-                random_between(0, 1) ? (uint8_t)random_bits() : (uint8_t)(copy.bytes[at] ^ 1 << n / 2 % 8);
+                random_between(0, 1) ? (uint8_t)random_bits() : (uint8_t)(copy.bytes[at] ^ (1 << n / 2 % 8));
             if (random_between(0, 9)) seal(&copy);
         }
         read_hostile(&copy, from);

@@ -18,14 +18,11 @@ typedef struct decoder {
     uint8_t bits[256];
 } decoder;
 
-static inline bool read_bit(wire_stream *s) {
-    const size_t at = s->at++;
-    return s->p[at >> 3] >> (at & 7) & 1;
-}
-
 static inline bool step_split(wire_walk *w, int stream, uint32_t a, uint32_t l, uint32_t r) {
+    wire_stream *s = &w->stream[stream];
+    const size_t at = s->at++;
     (void)a, (void)l, (void)r;
-    return read_bit(&w->stream[stream]);
+    return s->p[at >> 3] >> (at & 7) & 1;
 }
 
 static inline bool step_expects(const wire_walk *w, uint32_t a, uint32_t l, uint32_t r, bool split) {

@@ -13,12 +13,12 @@ static inline int32_t guess_of(const wire_walk *w, uint32_t l, uint32_t r) {
 }
 
 static inline void remember(wire_walk *w, uint32_t p) {
-    if (w->kind[p]) wire_table_insert(&w->table, rqt_vertex_clamp(&w->lattice, wire_at(w, p)), w->q[p]);
+    if (w->kind[p]) wire_table_insert(&w->table, wire_sample(w, wire_at(w, p)), w->q[p]);
 }
 
 /* Is the vertex at p, on a side or the rim, known from another block? Then take its height and index. */
 static bool recall(wire_walk *w, uint32_t p) {
-    const wire_entry *e = wire_table_find(&w->table, rqt_vertex_clamp(&w->lattice, wire_at(w, p)));
+    const wire_entry *e = wire_table_find(&w->table, wire_sample(w, wire_at(w, p)));
     if (!e) return false;
     w->q[p] = e->q;
     w->memo[p] = e->index;

@@ -3,16 +3,8 @@
 
 /* --------------------------------------------------------------------------------------------- tables */
 
-static uint64_t key_of(rqt_vertex v) {
-    return ((uint64_t)(uint32_t)v.y << 32 | (uint32_t)v.x) + 1;
-}
-
-static size_t place_of(uint64_t key, size_t size) {
-    return (size_t)((key * UINT64_C(0x9E3779B97F4A7C15)) >> 24) & (size - 1);
-}
-
 static void put(wire_table *table, const wire_entry *e) {
-    size_t at = place_of(e->key, table->size);
+    size_t at = wire_key_place(e->key, table->size);
     while (table->entry[at].key) at = (at + 1) & (table->size - 1);
     table->entry[at] = *e;
 }
@@ -32,17 +24,9 @@ bool wire_table_reserve(const rqt_allocator *allocator, wire_table *table, size_
     return true;
 }
 
-wire_entry *wire_table_find(const wire_table *table, rqt_vertex v) {
-    if (table->size == 0) return NULL;
-    const uint64_t key = key_of(v);
-    for (size_t at = place_of(key, table->size); table->entry[at].key; at = (at + 1) & (table->size - 1))
-        if (table->entry[at].key == key) return &table->entry[at];
-    return NULL;
-}
-
 /* There is room, and v is not there. */
 void wire_table_insert(wire_table *table, rqt_vertex v, int32_t q) {
-    const wire_entry e = {key_of(v), q, WIRE_NONE};
+    const wire_entry e = {wire_key(v), q, WIRE_NONE};
     put(table, &e);
     table->count++;
 }
@@ -148,7 +132,7 @@ bool wire_block_begin(wire_walk *w, const rqt_block_place *place) {
 
 /* The vertex at a place gets an index: that of its sample, if that has one. */
 void wire_vertex_append(wire_walk *w, uint32_t p) {
-    const rqt_vertex at = wire_at(w, p), sample = rqt_vertex_clamp(&w->lattice, at);
+    const rqt_vertex at = wire_at(w, p), sample = wire_sample(w, at);
     const uint8_t level = (uint8_t)rqt_vertex_level(&w->lattice, at);
     wire_entry *e = w->kind[p] ? wire_table_find(&w->table, sample) : NULL;
     if (e && e->index != WIRE_NONE) {
@@ -163,6 +147,16 @@ void wire_vertex_append(wire_walk *w, uint32_t p) {
         (rqt_patch_vertex){.col = sample.x, .row = sample.y, .q = w->q[p], .level = level};
 }
 
+static inline uint32_t give_index(uint32_t *memo, rqt_patch_vertex *vertices, uint32_t *next, uint32_t p) {
+    const uint32_t i = memo[p];
+    const bool is_new = i == WIRE_NONE;
+    const uint32_t index = is_new ? *next : i;
+    memo[p] = index;
+    vertices[*next].col = (int32_t)p;
+    *next += is_new;
+    return index;
+}
+
 void wire_settle_plain(wire_walk *w) {
     uint32_t *const memo = w->memo;
     rqt_patch_vertex *const vertices = w->vertices;
@@ -173,21 +167,21 @@ void wire_settle_plain(wire_walk *w) {
             const uint32_t *p = w->triangles + 3 * t;
             w->leaves[t] = (rqt_triangle){wire_at(w, p[0] & ~WIRE_CLOCKWISE), wire_at(w, p[1]), wire_at(w, p[2])};
         }
-    /* New vertices are a matter of chance: no branch. What is written for an old one is overwritten by the next. */
+    /* New vertices are a matter of chance: no branch. What is written for an old one is overwritten by the next.
+     * The walk leaves a leaf where it enters the next, so its left is the right of the one before, unless leaves
+     * are missing. */
+    uint32_t before = WIRE_NONE, before_index = 0;
     for (size_t t = w->settled; t < w->triangle_count; t++) {
-        uint32_t *out = w->triangles + 3 * t, index[3];
-        const uint32_t clockwise = out[0] >> 31, place[3] = {out[0] & ~WIRE_CLOCKWISE, out[1], out[2]};
-        for (int c = 0; c < 3; c++) {
-            const uint32_t p = place[c], i = memo[p];
-            const bool is_new = i == WIRE_NONE;
-            index[c] = is_new ? next : i;
-            memo[p] = index[c];
-            vertices[next].col = (int32_t)p;
-            next += is_new;
-        }
-        out[0] = index[0];
-        out[2 - clockwise] = index[1];
-        out[1 + clockwise] = index[2];
+        uint32_t *out = w->triangles + 3 * t;
+        const uint32_t clockwise = out[0] >> 31, a = out[0] & ~WIRE_CLOCKWISE, l = out[1], r = out[2];
+        const uint32_t ia = give_index(memo, vertices, &next, a);
+        const uint32_t il = l == before ? before_index : give_index(memo, vertices, &next, l);
+        const uint32_t ir = give_index(memo, vertices, &next, r);
+        before = r;
+        before_index = ir;
+        out[0] = ia;
+        out[2 - clockwise] = il;
+        out[1 + clockwise] = ir;
     }
     const uint8_t finest = (uint8_t)(w->lattice.K - w->shift);
     for (size_t i = first; i < next; i++) {

@@ -116,6 +116,27 @@ typedef struct wire_walk {
     size_t some_count, some_room, some_next;
 } wire_walk;
 
+static inline uint64_t wire_key(rqt_vertex v) {
+    return ((uint64_t)(uint32_t)v.y << 32 | (uint32_t)v.x) + 1;
+}
+
+static inline size_t wire_key_place(uint64_t key, size_t size) {
+    return (size_t)((key * UINT64_C(0x9E3779B97F4A7C15)) >> 24) & (size - 1);
+}
+
+static inline wire_entry *wire_table_find(const wire_table *table, rqt_vertex v) {
+    if (table->size == 0) return NULL;
+    const uint64_t key = wire_key(v);
+    for (size_t at = wire_key_place(key, table->size); table->entry[at].key; at = (at + 1) & (table->size - 1))
+        if (table->entry[at].key == key) return &table->entry[at];
+    return NULL;
+}
+
+static inline rqt_vertex wire_sample(const wire_walk *w, rqt_vertex v) {
+    return (rqt_vertex){v.x < w->lattice.width ? v.x : w->lattice.width - 1,
+                        v.y < w->lattice.height ? v.y : w->lattice.height - 1};
+}
+
 /* wire_walk.c */
 rqt_status wire_walk_create(wire_walk *w, const rqt_lattice *lattice, int k, const rqt_allocator *allocator);
 void wire_walk_free(wire_walk *w);
@@ -124,7 +145,6 @@ bool wire_block_begin(wire_walk *w, const rqt_block_place *place); /* false: no 
 void wire_settle_plain(wire_walk *w);
 void wire_vertex_append(wire_walk *w, uint32_t place);
 bool wire_table_reserve(const rqt_allocator *allocator, wire_table *table, size_t more);
-wire_entry *wire_table_find(const wire_table *table, rqt_vertex v);
 void wire_table_insert(wire_table *table, rqt_vertex v, int32_t q);
 bool wire_prior_create(const rqt_allocator *allocator, const rqt_lattice *lattice, const rqt_patch *state,
                        wire_table *prior);
