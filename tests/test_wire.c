@@ -424,6 +424,12 @@ static blob with_payload(const blob *b, const uint8_t *payload, size_t size) {
     return exact;
 }
 
+/* Another one, or one bit of it. */
+static uint8_t changed_byte(uint8_t byte, int bit) {
+    if (random_between(0, 1)) return (uint8_t)random_bits();
+    return (uint8_t)(byte ^ 1 << bit);
+}
+
 static void mutate(const blob *b, const answer *from, int rounds) {
     const size_t head = RQT_WIRE_HEADER_BYTES;
     uint8_t *payload = malloc(1 << 20);
@@ -441,8 +447,7 @@ static void mutate(const blob *b, const answer *from, int rounds) {
             for (int c = 0; c < changes; c++) {
                 const size_t at = random_between(0, 2) ? (size_t)(random_bits() % size)
                                                        : (size_t)random_between(0, size < 80 ? (int)size - 1 : 79);
-                changed[at] =
-                    random_between(0, 1) ? (uint8_t)random_bits() : (uint8_t)(changed[at] ^ (1 << (n / 2) % 8));
+                changed[at] = changed_byte(changed[at], n / 2 % 8);
             }
             if (random_between(0, 5) == 0) length = (size_t)(random_bits() % size) + 1;
             copy = with_payload(b, changed, length);
@@ -450,8 +455,7 @@ static void mutate(const blob *b, const answer *from, int rounds) {
             copy = blob_of(b->bytes, b->size);
             const size_t at =
                 random_between(0, 1) ? (size_t)(random_bits() % head) : (size_t)(random_bits() % copy.size);
-            copy.bytes[at] =
-                random_between(0, 1) ? (uint8_t)random_bits() : (uint8_t)(copy.bytes[at] ^ (1 << n / 2 % 8));
+            copy.bytes[at] = changed_byte(copy.bytes[at], n / 2 % 8);
             if (random_between(0, 9)) seal(&copy);
         }
         read_hostile(&copy, from);

@@ -194,7 +194,8 @@ static rqt_status run(decoder *d, const rqt_wire_header *h, const uint8_t *bytes
         status = RQT_NO_MEMORY;
     if (status == RQT_OK) {
         for (uint32_t t = 0; t < 256; t++) {
-            d->base[t] = t < WIRE_TOKENS ? wire_token_base(t) : 0;
+            /* What is no token is a residual that no height can have. */
+            d->base[t] = t < WIRE_TOKENS ? wire_token_base(t) : UINT32_MAX - 1;
             d->bits[t] = t < WIRE_TOKENS ? (uint8_t)wire_token_bits(t) : 0;
         }
         walk_cell(w, 0, 0, 0);

@@ -6,6 +6,7 @@
  */
 #include "rqt.h"
 
+#include <malloc.h>
 #include <sqlite3.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -55,7 +56,7 @@ static void measure(sqlite3 *db, const char *name, const char *where, const char
     const size_t bound = ZSTD_compressBound(indexed_size);
     uint8_t *packed = malloc(bound);
     if (!packed) stop("out of memory");
-    const size_t zstd = getenv("BENCH_ZSTD") ? ZSTD_compress(packed, bound, indexed, indexed_size, 19) : 0;
+    const size_t zstd = indexed_size <= 16 << 20 ? ZSTD_compress(packed, bound, indexed, indexed_size, 19) : 0;
     double least = 1e9, spent = 0;
     size_t vertices = 0, triangles = 0;
     for (int run = 0; run < 7 || (spent < 0.5 && run < 2000); run++) {
@@ -81,6 +82,8 @@ static void measure(sqlite3 *db, const char *name, const char *where, const char
 
 int main(int count, char **arguments) {
     static const double eps[] = {0, 1, 2, 5, 10, 20, 50};
+    (void)mallopt(M_MMAP_THRESHOLD, 1 << 30);
+    (void)mallopt(M_TRIM_THRESHOLD, INT32_MAX);
     if (count < 3) stop("usage: bench_wire RQT_SO DATABASE...");
     printf("%-12s %-6s %5s %8s %8s %10s %8s %8s %8s %8s\n", "terrain", "part", "eps", "vertices", "triangl.",
            "bytes", "B/vertex", "Mvert/s", "indexed", "zstd-19");
