@@ -13,7 +13,7 @@ enum {
     /* As for blocks (block_codec.c): residuals have an entropy and no repeats worth a match of less than 7. */
     ZSTD_LEVEL = 3,
     ZSTD_MATCH = 7,
-    WORTH_A_TABLE = 512 /* bytes of a stream, below which it shares a zstd block with its neighbours */
+    WORTH_A_TABLE = 256 /* bytes of a stream, below which it shares a zstd block with its neighbours */
 };
 
 /* ------------------------------------------------------------------------------------------ primitives */
