@@ -71,13 +71,24 @@ const function rqt_functions[] = {
     {.name = "rqt_mesh",
      .arguments = "region, eps, format [, terrain [, options]]",
      .returns = "BLOB, TEXT for obj",
-     .purpose = "The mesh of a region as a file's bytes; format: strip, indexed (src/core/FORMAT.md), obj, ply, "
-                "wkb, gpkg, "
-                "spatialite.",
+     .purpose = "The mesh of a region as a file's bytes; format: strip, indexed, rqt (src/core/FORMAT.md; rqt "
+                "takes about a byte a vertex), obj, ply, wkb, gpkg, spatialite.",
      .example = "SELECT length(rqt_mesh(" SUMMIT ", 10, 'ply'))",
      .call = call_mesh,
      .least = 3,
      .most = 5,
+     .flags = READS},
+    {.name = "rqt_delta",
+     .arguments = "region, eps_from, eps_to [, terrain]",
+     .returns = "BLOB",
+     .purpose =
+         "What makes the mesh of a region finer: the vertices with error in (eps_to, eps_from], for a holder of "
+         "rqt_mesh(region, eps_from, 'rqt'). Applied step by step (rqt_wire_apply of rqt.h) it ends in the "
+         "mesh of eps_to, bit for bit.",
+     .example = "SELECT length(rqt_delta(" SUMMIT ", 20, 10))",
+     .call = call_delta,
+     .least = 3,
+     .most = 4,
      .flags = READS},
     {.name = "rqt_verify",
      .arguments = MESH,

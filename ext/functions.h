@@ -80,6 +80,8 @@ int request_read(connection *c, sqlite3_value *region, sqlite3_value *eps, sqlit
                  sqlite3_value *options, request *out, char **error);
 /* A patch with what the product needs; of strips, the one that the options want. Give it back with store_keep. */
 int request_patch(request *r, rqt_product product, rqt_patch *patch, store_reads *reads, char **error);
+/* The patch in wire format. delta.c */
+int wire_mesh(request *r, uint8_t **bytes, size_t *size, char **error);
 void request_free(request *r);
 /* The terrain that a value names; NULL value: the only one. */
 int request_terrain(store *s, sqlite3_value *name, const store_terrain **terrain, char **error);
@@ -96,5 +98,6 @@ fill_rows fill_range, fill_triangles, fill_strip;                          /* me
 fill_rows fill_terrains, fill_explain, fill_verify, fill_check, fill_help; /* insight_tables.c, verify_table.c */
 scalar_call call_version, call_build_info, call_bbox, call_circle, call_mesh, call_height; /* scalar.c */
 scalar_call call_block_info, call_block_check, call_block_dump;                            /* block_functions.c */
+scalar_call call_delta;                                                                    /* delta.c */
 
 #endif

@@ -152,18 +152,22 @@ void call_mesh(sqlite3_context *result, int count, sqlite3_value **arguments) {
     const char *format =
         sqlite3_value_type(arguments[2]) == SQLITE_TEXT ? (const char *)sqlite3_value_text(arguments[2]) : "";
     const bool strip = strcmp(format, "strip") == 0, indexed = strcmp(format, "indexed") == 0;
-    const bool other = !strip && !indexed && format_from_name(format, &kind);
+    const bool wire = strcmp(format, "rqt") == 0;
+    const bool other = !strip && !indexed && !wire && format_from_name(format, &kind);
     int code = SQLITE_OK;
-    if (strcmp(format, "rqt") == 0 || strcmp(format, "glb") == 0)
+    if (strcmp(format, "glb") == 0)
         code = fail(&error, "format \"%s\" is not in this version", format);
-    else if (!strip && !indexed && !other)
-        code = fail(&error, "unknown format \"%s\"; there are strip indexed obj ply wkb gpkg spatialite", format);
+    else if (!strip && !indexed && !wire && !other)
+        code =
+            fail(&error, "unknown format \"%s\"; there are strip indexed rqt obj ply wkb gpkg spatialite", format);
     if (code == SQLITE_OK)
         code = request_read(c, arguments[0], arguments[1], count > 3 ? arguments[3] : NULL,
                             count > 4 ? arguments[4] : NULL, &r, &error);
-    if (code == SQLITE_OK)
+    if (code == SQLITE_OK && wire)
+        code = wire_mesh(&r, &bytes, &size, &error);
+    else if (code == SQLITE_OK)
         code = request_patch(&r, strip ? RQT_PRODUCT_STRIP : RQT_PRODUCT_TRIANGLES, &patch, NULL, &error);
-    if (code == SQLITE_OK)
+    if (code == SQLITE_OK && !wire)
         code = other ? other_format(&r, &patch, kind, &bytes, &size, &error)
                      : own_format(&r, &patch, strip ? RQT_MESH_STRIP : RQT_MESH_INDEXED, &bytes, &size, &error);
     if (r.store) store_keep(r.store, &patch);

@@ -147,6 +147,16 @@ MUTANTS = [
      "test_import_faults", "sources_of_unlike_grids_are_refused"),
     ("import: heights far from zero", "src/import/quantise.c", "(int64_t)middle", "(int64_t)0",
      "test_import", "heights_far_from_zero_lose_nothing"),
+    # the wire format
+    ("wire: a guess stays where a height was sent", "src/core/wire_steps.h",
+     "        settle(w, m, false);\n        return true;", "        return true;",
+     "test_wire", "the_patch_of_the_query_comes_back_in_its_order"),
+    ("wire: an increment of any mesh is taken", "src/core/wire_decode.c",
+     "if (rqt_wire_digest(patch) != from)", "if (from == 0)",
+     "test_wire", "increments_that_belong_elsewhere_are_refused_with_a_reason"),
+    ("wire: heights beyond the limit", "src/core/wire_decode.c",
+     "if (q > -RQT_HEIGHT_LIMIT && q < RQT_HEIGHT_LIMIT)", "if (q != INT64_MIN)",
+     "test_wire", "hostile_bytes_are_refused_or_harmless"),
 ]
 
 

@@ -632,6 +632,65 @@ void rqt_mesh_encode(const rqt_mesh_header *header, const rqt_patch_vertex *vert
 rqt_status rqt_mesh_decode(const uint8_t *bytes, size_t size, rqt_mesh_header *header, const uint8_t **vertices,
                            const uint8_t **indices);
 
+/* ---------------------------------------------------------------------------------------------- wire --
+ * A patch in about a byte a vertex, to send and to keep: topology as decisions of the walk, heights as residuals
+ * (FORMAT.md, "Wire"). What is decoded is the patch of the query: the same vertices and triangles in the same
+ * order; only the errors of vertices are not sent and read 0. Mesh to memory in ten lines:
+ *
+ *   rqt_wire_header header;
+ *   rqt_patch patch;
+ *   rqt_message why;
+ *   if (rqt_wire_decode(blob, blob_size, false, &allocator, &header, &patch, &why) != RQT_OK) complain(why.text);
+ *   for (size_t i = 0; i < patch.vertex_count; i++) {
+ *       const rqt_patch_vertex *v = &patch.vertices[i];
+ *       put_vertex(header.placement.x0 + v->col * header.placement.dx, header.placement.y0 + v->row *
+ *                  header.placement.dy, rqt_unit_metres(&header.unit, v->q));
+ *   }
+ *   put_indices(patch.triangles, 3 * patch.triangle_count); // counter-clockwise from above
+ *   rqt_patch_free(&patch);
+ *
+ * An *increment* (rqt_delta) brings such a mesh from one eps to a smaller one: it holds the vertices with errors in
+ * (eps, eps_from]. Whatever the steps, the mesh of an eps is the same, bit for bit. */
+#define RQT_WIRE_HEADER_BYTES 144
+
+typedef struct rqt_wire_header {
+    bool is_delta;
+    rqt_lattice lattice;
+    int k;                                 /* block size of the terrain: the order of the walk depends on it */
+    uint64_t vertex_count, triangle_count; /* of the mesh; of an increment: of the mesh that it ends in */
+    rqt_placement placement;
+    rqt_unit unit;
+    double eps;
+    int32_t srid;
+    double eps_from; /* of an increment; else 0 */
+    uint64_t from;   /* of an increment: rqt_wire_digest of the mesh that it begins from; else 0 */
+} rqt_wire_header;
+
+/* The most bytes that rqt_wire_encode can write. */
+size_t rqt_wire_bound(size_t vertex_count, size_t triangle_count, size_t block_count);
+/* The patch of a query with leaves (mode `cover`) as bytes, which have room for rqt_wire_bound. numbers: the blocks
+ * of the query's answers, as rqt_query_run has sorted them. state NULL: the whole mesh; else an increment from the
+ * patch `state` (with leaves, same terrain and region, header->eps_from >= header->eps). The counts, is_delta and
+ * from of the header are filled in. RQT_INVALID when patch is not what the walk over these blocks gives, or not
+ * finer than state. Equal patches give equal bytes. */
+rqt_status rqt_wire_encode(const rqt_wire_header *header, const rqt_block_number *numbers, size_t block_count,
+                           const rqt_patch *patch, const rqt_patch *state, const rqt_allocator *allocator,
+                           uint8_t *bytes, size_t *size);
+/* Header only; the checksum of all bytes is compared. */
+rqt_status rqt_wire_info(const uint8_t *bytes, size_t size, rqt_wire_header *header, rqt_message *message);
+/* bytes -> patch, to be released with rqt_patch_free. wants_leaves: fill patch->leaves, which increments need.
+ * Trusts nothing: any input gives RQT_OK, RQT_CORRUPT, RQT_INVALID for an increment, or RQT_NO_MEMORY; the memory
+ * taken is bounded by the size of the payload, which is at most 2^15 times that of the bytes. */
+rqt_status rqt_wire_decode(const uint8_t *bytes, size_t size, bool wants_leaves, const rqt_allocator *allocator,
+                           rqt_wire_header *header, rqt_patch *patch, rqt_message *message);
+/* The patch `state` (decoded with leaves, or the result of an apply) and its header, made finer by an increment.
+ * The new patch has leaves. RQT_INVALID with a sentence for an increment that belongs to another mesh. */
+rqt_status rqt_wire_apply(const rqt_wire_header *state_header, const rqt_patch *state, const uint8_t *bytes,
+                          size_t size, const rqt_allocator *allocator, rqt_wire_header *header, rqt_patch *patch,
+                          rqt_message *message);
+/* What an increment knows a mesh by: its vertices, their levels and heights, and its leaves, in their order. */
+uint64_t rqt_wire_digest(const rqt_patch *patch);
+
 #ifdef __cplusplus
 }
 #endif
