@@ -34,7 +34,8 @@ typedef struct half {
 #define VECTOR_CLONES
 #endif
 
-/* chosen = error > eps or a flag of the mask. Returns the flags that all have. */
+/* chosen = error > eps or a flag of the mask. Returns the flags that all of them have: corners of leaves are
+ * vertices that are chosen, or corners of the block. */
 VECTOR_CLONES
 static uint8_t choose_by_error(const rqt_block *b, size_t count, rqt_code eps, uint8_t mask, uint8_t *chosen) {
     enum { STEP = 64 };
@@ -48,27 +49,28 @@ static uint8_t choose_by_error(const rqt_block *b, size_t count, rqt_code eps, u
         for (size_t line = 0; line < STEP; line += 16) __builtin_prefetch(b->q + i + line);
         for (size_t j = i; j < i + STEP; j++) {
             out[j] = (uint8_t)((error[j] > eps) | ((flags[j] & mask) != 0));
-            all &= flags[j];
+            all &= (uint8_t)(flags[j] | (out[j] - 1));
         }
     }
     for (; i < count; i++) {
         out[i] = (uint8_t)((error[i] > eps) | ((flags[i] & mask) != 0));
-        all &= flags[i];
+        all &= (uint8_t)(flags[i] | (out[i] - 1));
     }
     return all;
 }
 
 void walk_choose(walk *w) {
-    const size_t count = (size_t)w->n * (size_t)w->n;
-    const uint8_t mask = w->query->outline == RQT_OUTLINE_EXACT ? RQT_OUTLINE : 0;
-    const bool all = choose_by_error(w->block, count, w->query->eps, mask, w->chosen) & RQT_VALID;
-    w->plain = all && !w->clamped && !w->aliased && !w->query->wants_leaves;
-    if (!w->selection) return;
-    for (size_t i = 0; i < count; i++) {
-        const rqt_vertex at = {w->place.x + (int32_t)(i % (size_t)w->n) * w->place.stride,
-                               w->place.y + (int32_t)(i / (size_t)w->n) * w->place.stride};
+    const uint32_t n = (uint32_t)w->n, last = n - 1;
+    const uint8_t mask = w->query->outline == RQT_OUTLINE_EXACT ? RQT_OUTLINE : 0, *const flags = w->block->flags;
+    uint8_t all = choose_by_error(w->block, (size_t)n * n, w->query->eps, mask, w->chosen);
+    for (uint32_t i = 0; w->selection && i < n * n; i++) {
+        const rqt_vertex at = {w->place.x + (int32_t)(i % n) * w->place.stride,
+                               w->place.y + (int32_t)(i / n) * w->place.stride};
         w->chosen[i] = rqt_selection_has(w->selection, at);
+        if (w->chosen[i]) all &= flags[i];
     }
+    all &= flags[0] & flags[last] & flags[last * n] & flags[last * n + last];
+    w->plain = (all & RQT_VALID) && !w->clamped && !w->aliased && !w->query->wants_leaves;
 }
 
 /* ------------------------------------------------------------------------------------------- without care */

@@ -80,7 +80,7 @@ typedef struct walk {
     size_t border_count;
     bool clamped; /* some of its vertices are past the last sample */
     bool aliased; /* another lattice vertex may be the same sample as one of its own */
-    bool plain;   /* without voids, no vertex past the last sample, and nobody asks for the leaves */
+    bool plain;   /* no leaf has a void corner or one past the last sample, and nobody asks for the leaves */
 } walk;
 
 /* A corner of a leaf on its way into the patch. */
