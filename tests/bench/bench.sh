@@ -5,6 +5,8 @@
 # terrain and the programs stay in build/bench for the next time, with the figures in bench.csv.
 #   BENCH_K=12      2^K + 1 samples a side
 #   BENCH_RUNS=5    of whole programs
+#   BENCH_LARGE=5   imports of 32769 x 16385 samples with --memory 256; 0: leave the large database out (it takes minutes
+#                   and 2 GB of disk)
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 BUILD=${BUILD:-build}
@@ -12,6 +14,7 @@ RQT=${RQT:-$BUILD/rqt}
 RQT_SO=${RQT_SO:-$BUILD/rqt.so}
 K=${BENCH_K:-12}
 RUNS=${BENCH_RUNS:-5}
+LARGE=${BENCH_LARGE:-5}
 OUT=$BUILD/bench
 side=$(((1 << K) + 1))
 raster=$OUT/fbm_$side.bin
@@ -34,6 +37,7 @@ compile() { # OUTPUT FLAGS SOURCES...
     done
 }
 compile "$OUT/make_terrain" "" tests/bench/make_terrain.c
+compile "$OUT/mirror_terrain" "" tests/bench/mirror_terrain.c
 compile "$OUT/bench" "$(gdal-config --cflags) -lsqlite3 $(gdal-config --libs) -lm" \
     tests/bench/bench.c tests/bench/bench_table.c
 
@@ -67,8 +71,23 @@ done
 echo "database_bytes $(stat -c %s "$OUT/fbm.gpkg")" >>"$times"
 echo "cog_bytes $(stat -c %s "$OUT/cog.tif")" >>"$times"
 
+large=()
+if ((LARGE > 0 && K == 12)); then
+    big=$OUT/fbm_large.bin
+    [[ -e $big && ! $raster -nt $big ]] || "$OUT/mirror_terrain" "$raster" "$side" 8 4 "$big"
+    echo "large_samples $((32769 * 16385))" >>"$times"
+    for ((run = 1; run <= LARGE; run++)); do
+        [[ ! -t 2 ]] || printf '\rLarge import, run %d of %d ' "$run" "$LARGE" >&2
+        rm -f "$OUT/large.gpkg"
+        timed large_import /usr/bin/python3 tests/bench/peak.py "$RQT" import --memory 256 --name fbm "$big" "$OUT/large.gpkg"
+        sed -n 's/^peak_kib /large_rss_kib /p' "$OUT/log.txt" >>"$times"
+    done
+    [[ ! -t 2 ]] || printf '\r%40s\r' '' >&2
+    large=("$OUT/large.gpkg")
+fi
+
 machine="$(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo | head -n 1), $(nproc) cores"
 data="generated fBm (H 0.9, seed 1), $side x $side int16, 30 m cells, 0 to 4000 m"
-"$OUT/bench" "$OUT/fbm.gpkg" "$RQT_SO" "$tiff" "$times" "$OUT/bench.csv" "$machine" "$data"
+"$OUT/bench" "$OUT/fbm.gpkg" "$RQT_SO" "$tiff" "$times" "$OUT/bench.csv" "$machine" "$data" "${large[@]}"
 echo
 echo "The same figures: $OUT/bench.csv"
