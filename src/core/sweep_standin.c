@@ -1,5 +1,7 @@
 /* Stand-in until the sweep is there: one band only (b = K). */
 #include "internal.h"
+const rqt_grid *standin_grid;
+#include <assert.h>
 struct rqt_sweep {
     rqt_allocator a;
     rqt_sweep_plan plan;
@@ -28,18 +30,38 @@ void rqt_sweep_free(rqt_sweep *s) {
     memory_drop(&a, s->valid);
     memory_drop(&a, s);
 }
-int32_t rqt_sweep_bands(const rqt_sweep *s) { (void)s; return 1; }
-int32_t rqt_sweep_tiles(const rqt_sweep *s) { (void)s; return 1; }
-bool rqt_sweep_wants(const rqt_sweep *s, int32_t y) { (void)s; (void)y; return true; }
-void rqt_sweep_first(rqt_sweep *s, int32_t y, const int32_t *q, const uint8_t *v) { (void)s; (void)y; (void)q; (void)v; }
+static int32_t along(int32_t n, int b) { return n > 1 ? ((n - 2) >> b) + 1 : 1; }
+int32_t rqt_sweep_bands(const rqt_sweep *s) { return along(s->plan.lattice.height, s->plan.b); }
+int32_t rqt_sweep_tiles(const rqt_sweep *s) { return along(s->plan.lattice.width, s->plan.b); }
+static int32_t clampy(int64_t y, int32_t n) { return y < n ? (int32_t)y : n - 1; }
+static void expect(bool ok) { if (!ok) __builtin_trap(); }
+bool rqt_sweep_wants(const rqt_sweep *s, int32_t y) { return y % (1 << s->plan.b) == 0 || y == s->plan.lattice.height - 1; }
+void rqt_sweep_first(rqt_sweep *s, int32_t y, const int32_t *q, const uint8_t *v) {
+    int32_t w = s->plan.lattice.width;
+    expect(rqt_sweep_wants(s, y) && (v != NULL) == s->plan.has_voids);
+    if (!standin_grid) return;
+    for (int32_t x = 0; x < w; x++) if (x % (1 << s->plan.b) == 0 || x == w - 1) {
+        size_t at = (size_t)y * (size_t)w + (size_t)x;
+        bool valid = !standin_grid->valid || standin_grid->valid[at];
+        expect(valid == (!v || v[x]));
+        if (valid) expect(q[x] == standin_grid->q[at]);
+    } }
 void rqt_sweep_begin(rqt_sweep *s, int32_t band, int32_t *first, int32_t *count, int32_t **q, uint8_t **valid) {
-    (void)band; *first = 0; *count = s->plan.lattice.height; *q = s->q; *valid = s->valid; }
-void rqt_sweep_tile(rqt_sweep *s, int w, int32_t t) { (void)w; (void)t;
+    int32_t h = s->plan.lattice.height, from = band ? (band << s->plan.b) + 1 : 0, last = clampy((int64_t)(band + 1) << s->plan.b, h);
+    *first = from; *count = last - from + 1;
+    *q = s->q + (size_t)from * (size_t)s->plan.lattice.width;
+    *valid = s->plan.has_voids ? s->valid + (size_t)from * (size_t)s->plan.lattice.width : NULL; }
+void rqt_sweep_tile(rqt_sweep *s, int w, int32_t t) { (void)s; (void)w; (void)t; }
+void rqt_sweep_end(rqt_sweep *s) {
+    if (s->e.code) return;
     rqt_grid g = {s->plan.lattice, s->q, s->valid};
+    if (standin_grid) g = *standin_grid;
     (void)rqt_errors_compute(&g, &s->plan.unit, &s->plan.cost, &s->a, NULL, NULL, &s->e);
     rqt_errors_saturate(&s->e); }
-void rqt_sweep_end(rqt_sweep *s) { (void)s; }
-rqt_band rqt_sweep_band(const rqt_sweep *s, int32_t b) { return (rqt_band){0, s->plan.lattice.height, s->q, s->valid, s, b}; }
+rqt_band rqt_sweep_band(const rqt_sweep *s, int32_t b) {
+    int32_t h = s->plan.lattice.height, from = b << s->plan.b, last = clampy((int64_t)(b + 1) << s->plan.b, h);
+    size_t at = (size_t)from * (size_t)s->plan.lattice.width;
+    return (rqt_band){from, last - from + 1, s->q + at, s->valid ? s->valid + at : NULL, s, b}; }
 rqt_code rqt_band_error(const rqt_band *b, rqt_vertex v, bool *o) {
     *o = false; if (rqt_vertex_scale(&b->sweep->plan.lattice, v) >= b->sweep->plan.b) return 0;
     return rqt_errors_at(&b->sweep->e, v, o); }
