@@ -123,7 +123,7 @@ static void import_in_a_way(const char *const *sources, int count, const char *d
 static void expect_every_way(const char *name, const char *const *sources, int count, const grid *g) {
     static const int strip_rows[] = {1, 5, 64, 3, 1000}, strips[] = {1, 2, 3, 5};
     unsigned way = 0;
-    for (int k = 1; k <= 4; k++) {
+    for (int k = 1; k <= 3; k += 2) {
         import_options o = defaults();
         o.k = k;
         o.name = "a";

@@ -255,28 +255,39 @@ static bool unreadable(const import_reading *r, const import_source *s, int32_t 
                          CPLGetLastErrorMsg());
 }
 
-/* The only source of these rows, integers in the order of the grid: straight into the strip. */
-static bool read_directly(import_reading *r, int source, int32_t top, int32_t rows, import_strip *strip,
-                          size_t at) {
+/* The only source of a whole strip, integers in the order of the grid: straight into the strip. Returns the number
+ * of voids, or -1. */
+static int64_t read_directly(import_reading *r, int source, import_strip *strip) {
     const import_source *s = &r->sources[source];
-    const size_t width = (size_t)strip->width;
-    int32_t *values = (int32_t *)strip->values + at;
+    const size_t n = (size_t)strip->rows * (size_t)strip->width;
+    const int32_t *values = strip->values;
+    uint8_t *valid = strip->valid;
     const voids v = voids_of(s, r->job->options);
     CPLErrorReset();
-    if (GDALRasterIOEx(GDALGetRasterBand(r->dataset[source], 1), GF_Read, 0, top, s->width, rows, values, s->width,
-                       rows, GDT_Int32, 0, (GSpacing)(width * sizeof *values), NULL) != CE_None)
-        return unreadable(r, s, top, rows);
-    for (int32_t y = 0; y < rows; y++) {
-        const int32_t *from = values + (size_t)y * width;
-        uint8_t *valid = strip->valid + at + (size_t)y * width;
+    if (GDALRasterIO(GDALGetRasterBand(r->dataset[source], 1), GF_Read, 0, strip->first_row, s->width, strip->rows,
+                     strip->values, s->width, strip->rows, GDT_Int32, 0, 0) != CE_None) {
+        (void)unreadable(r, s, strip->first_row, strip->rows);
+        return -1;
+    }
+    if (v.count == 0) {
+        memset(valid, HAS_DATA, n);
+        return 0;
+    }
+    int64_t found = 0;
+    for (size_t y = 0; y < (size_t)strip->rows; y++) {
+        const int32_t *from = values + y * (size_t)strip->width;
+        uint8_t *to = valid + y * (size_t)strip->width;
+        uint32_t marks = 0;
         if (v.count == 1 && v.integer[0] == (int32_t)v.integer[0]) {
             const int32_t mark = (int32_t)v.integer[0];
-            for (int32_t i = 0; i < s->width; i++) valid[i] = from[i] != mark;
+            for (int32_t i = 0; i < strip->width; i++) to[i] = from[i] != mark;
         } else {
-            for (int32_t i = 0; i < s->width; i++) valid[i] = !is_void_integer(&v, from[i]);
+            for (int32_t i = 0; i < strip->width; i++) to[i] = !is_void_integer(&v, from[i]);
         }
+        for (int32_t i = 0; i < strip->width; i++) marks += !to[i];
+        found += marks;
     }
-    return true;
+    return found;
 }
 
 /* rows: of the file, from top on. The strip's row of the first one and the direction from there. */
@@ -327,39 +338,36 @@ static void settle(import_strip *strip, import_counts *counts) {
     counts->overlap_differs += differs;
 }
 
-/* The sources that meet the strip: their number, and the last of them. */
-static int meeting(const import_reading *r, const import_strip *strip, int *last) {
-    int n = 0;
-    for (int i = 0; i < r->count; i++) {
-        if (r->mosaic->row[i] >= strip->first_row + strip->rows ||
-            r->mosaic->row[i] + r->sources[i].height <= strip->first_row)
-            continue;
-        *last = i;
-        n++;
-    }
-    return n;
+/* Can it be read without merging? */
+static bool is_direct(const import_reading *r, int source, const import_strip *strip) {
+    const import_source *s = &r->sources[source];
+    return r->count == 1 && strip->kind == IMPORT_I32 && !s->has_mask && !s->is_signed_byte && !s->flip_rows &&
+           !s->flip_columns;
+}
+
+/* What the strip wants of one source. */
+static bool merge_source(import_reading *r, int source, import_strip *strip) {
+    const import_source *s = &r->sources[source];
+    const int32_t row = r->mosaic->row[source];
+    const int32_t from = row > strip->first_row ? row : strip->first_row;
+    const int32_t to = smaller(row + s->height, strip->first_row + strip->rows);
+    if (from >= to) return true;
+    const int32_t top = s->flip_rows ? row + s->height - to : from - row;
+    if (!opened(r, source) || !read_merging(r, source, top, to - from, strip, from - strip->first_row))
+        return false;
+    if (to == row + s->height || r->open > MOST_OPEN) shut(r, source);
+    return true;
 }
 
 bool import_reading_strip(import_reading *r, import_strip *strip, import_counts *counts) {
-    int sole = -1;
-    const int32_t end = strip->first_row + strip->rows;
-    if (meeting(r, strip, &sole) != 1) sole = -1;
-    memset(strip->valid, 0, (size_t)strip->rows * (size_t)strip->width);
-    for (int i = 0; i < r->count; i++) {
-        const import_source *s = &r->sources[i];
-        const int32_t row = r->mosaic->row[i];
-        const int32_t from = row > strip->first_row ? row : strip->first_row, to = smaller(row + s->height, end);
-        if (from >= to) continue;
-        if (!opened(r, i)) return false;
-        const int32_t top = s->flip_rows ? row + s->height - to : from - row;
-        const bool direct = i == sole && strip->kind == IMPORT_I32 && !s->has_mask && !s->is_signed_byte &&
-                            !s->flip_rows && !s->flip_columns;
-        const size_t at = (size_t)(from - strip->first_row) * (size_t)strip->width + (size_t)r->mosaic->column[i];
-        if (direct ? !read_directly(r, i, top, to - from, strip, at)
-                   : !read_merging(r, i, top, to - from, strip, from - strip->first_row))
-            return false;
-        if (to == row + s->height || r->open > MOST_OPEN) shut(r, i);
+    if (is_direct(r, 0, strip)) {
+        const int64_t found = opened(r, 0) ? read_directly(r, 0, strip) : -1;
+        if (found >= 0) counts->voids += found;
+        return found >= 0;
     }
+    memset(strip->valid, 0, (size_t)strip->rows * (size_t)strip->width);
+    for (int i = 0; i < r->count; i++)
+        if (!merge_source(r, i, strip)) return false;
     settle(strip, counts);
     return true;
 }
