@@ -9,37 +9,6 @@
  */
 #include "deviation.h"
 
-/* ------------------------------------------------------------------------------------- rows of a plane --
- * max over n samples of |(z[i] - base) * 2^m - (start + i * slope)|. */
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
-    !defined(RQT_SCALAR)
-#define VECTOR_CLONES __attribute__((target_clones("avx2", "default")))
-#else
-#define VECTOR_CLONES
-#endif
-
-VECTOR_CLONES static uint32_t row_deviation_32(const int32_t *z, int32_t n, uint32_t base, int m, uint32_t start,
-                                               uint32_t slope) {
-    uint32_t most = 0;
-    for (int32_t i = 0; i < n; i++) {
-        const int32_t d = (int32_t)((((uint32_t)z[i] - base) << m) - start - (uint32_t)i * slope);
-        const uint32_t size = d < 0 ? 0u - (uint32_t)d : (uint32_t)d;
-        most = size > most ? size : most;
-    }
-    return most;
-}
-
-VECTOR_CLONES static uint64_t row_deviation_64(const int32_t *z, int32_t n, int64_t base, int m, int64_t start,
-                                               int64_t slope) {
-    int64_t most = 0;
-    for (int32_t i = 0; i < n; i++) {
-        const int64_t d = (z[i] - base) * ((int64_t)1 << m) - start - i * slope;
-        const int64_t size = d < 0 ? -d : d;
-        most = size > most ? size : most;
-    }
-    return (uint64_t)most;
-}
-
 static int32_t smaller(int32_t a, int32_t b) {
     return a < b ? a : b;
 }
@@ -47,66 +16,137 @@ static int32_t larger(int32_t a, int32_t b) {
     return a > b ? a : b;
 }
 
-/* A triangle of the lattice inside the raster, all valid: its deviation as a multiple of 2^-m. */
-uint64_t plane_deviation(const deviation_field *s, const rqt_triangle *t, int *shift) {
-    const rqt_vertex a = t->apex, l = t->left, r = t->right;
-    const int32_t zl = height_at(s, l.x, l.y), zr = height_at(s, r.x, r.y), za = height_at(s, a.x, a.y);
-    const int32_t x0 = smaller(smaller(a.x, l.x), r.x), x1 = larger(larger(a.x, l.x), r.x);
-    const int32_t y0 = smaller(smaller(a.y, l.y), r.y), y1 = larger(larger(a.y, l.y), r.y);
-    /* Gradients times 2^m, and the sample that the plane is written about: (x0 or so, where z is known). */
+/* ---------------------------------------------------------------------------------------------- triangles */
+
+bool triangle_has_area(const deviation_field *s, const rqt_triangle *t) {
+    return smaller(smaller(t->apex.x, t->left.x), t->right.x) < s->width - 1 &&
+           smaller(smaller(t->apex.y, t->left.y), t->right.y) < s->height - 1;
+}
+
+static bool is_clamped(const deviation_field *s, const rqt_triangle *t) {
+    return larger(larger(t->apex.x, t->left.x), t->right.x) >= s->width ||
+           larger(larger(t->apex.y, t->left.y), t->right.y) >= s->height;
+}
+
+plane_triangle triangle_of_samples(const deviation_field *s, const rqt_triangle *t) {
+    plane_triangle out = {.t = *t, .has_plane = true};
+    const rqt_vertex corner[3] = {t->apex, t->left, t->right};
+    int32_t *const height[3] = {&out.apex, &out.left, &out.right};
+    for (int i = 0; i < 3; i++) {
+        const rqt_vertex at = rqt_vertex_clamp(&s->lattice, corner[i]);
+        const size_t index = sample_index(s, at.x, at.y);
+        *height[i] = s->q[index];
+        if (s->valid && !s->valid[index]) out.has_plane = false;
+    }
+    return out;
+}
+
+/* -------------------------------------------------------------------------- inside the raster, without voids */
+
+typedef struct row_span {
+    int32_t x0, x1;
+} row_span;
+
+/* The samples of row y in a triangle that is not clamped. x0..y1 is its box. */
+static row_span span_of(const rqt_triangle *t, const sample_window *box, int32_t y) {
+    const int32_t from_top = y - box->y0, from_bottom = box->y1 - y;
+    row_span out = {box->x0, box->x1};
+    if (t->left.x != t->right.x && t->left.y != t->right.y) {
+        /* Legs on axes: full beside the apex, one sample at the far end of the vertical leg. */
+        const int32_t cut = t->apex.y == box->y0 ? from_top : from_bottom;
+        if (t->apex.x == box->x0)
+            out.x1 -= cut;
+        else
+            out.x0 += cut;
+    } else if (t->left.y == t->right.y) {
+        const int32_t cut = t->apex.y == box->y0 ? from_bottom : from_top;
+        out.x0 += cut;
+        out.x1 -= cut;
+    } else {
+        const int32_t reach = smaller(from_top, from_bottom);
+        if (t->apex.x == box->x0)
+            out.x0 = box->x1 - reach;
+        else
+            out.x1 = box->x0 + reach;
+    }
+    return out;
+}
+
+static sample_window box_of(rqt_vertex a, rqt_vertex l, rqt_vertex r) {
+    return (sample_window){smaller(smaller(a.x, l.x), r.x), smaller(smaller(a.y, l.y), r.y),
+                           larger(larger(a.x, l.x), r.x), larger(larger(a.y, l.y), r.y)};
+}
+
+/* Gradients of a plane times 2^m. */
+typedef struct slopes {
     int64_t gx, gy;
     int m;
-    const bool legs_on_axes = l.x != r.x && l.y != r.y;
-    if (legs_on_axes) {
-        m = __builtin_ctz((unsigned)(x1 - x0));
+} slopes;
+
+static slopes slopes_of(const plane_triangle *p, const sample_window *box) {
+    const rqt_vertex a = p->t.apex, l = p->t.left, r = p->t.right;
+    const int64_t za = p->apex, zl = p->left, zr = p->right;
+    int64_t gx, gy;
+    if (l.x != r.x && l.y != r.y) { /* legs on axes */
         const bool l_along_x = l.y == a.y;
         const int64_t zx = l_along_x ? zl : zr, zy = l_along_x ? zr : zl;
-        gx = a.x == x0 ? zx - za : za - zx;
-        gy = a.y == y0 ? zy - za : za - zy;
-    } else if (l.y == r.y) { /* hypotenuse along x */
-        m = __builtin_ctz((unsigned)(x1 - x0));
-        gx = l.x < r.x ? (int64_t)zr - zl : (int64_t)zl - zr;
-        gy = 2 * (int64_t)za - zl - zr;
-        if (a.y == y0) gy = -gy;
-    } else { /* along y */
-        m = __builtin_ctz((unsigned)(y1 - y0));
-        gy = l.y < r.y ? (int64_t)zr - zl : (int64_t)zl - zr;
-        gx = 2 * (int64_t)za - zl - zr;
-        if (a.x == x0) gx = -gx;
+        gx = a.x == box->x0 ? zx - za : za - zx;
+        gy = a.y == box->y0 ? zy - za : za - zy;
+        return (slopes){gx, gy, __builtin_ctz((unsigned)(box->x1 - box->x0))};
     }
+    if (l.y == r.y) { /* hypotenuse along x */
+        gx = l.x < r.x ? zr - zl : zl - zr;
+        gy = 2 * za - zl - zr;
+        if (a.y == box->y0) gy = -gy;
+        return (slopes){gx, gy, __builtin_ctz((unsigned)(box->x1 - box->x0))};
+    }
+    gy = l.y < r.y ? zr - zl : zl - zr;
+    gx = 2 * za - zl - zr;
+    if (a.x == box->x0) gx = -gx;
+    return (slopes){gx, gy, __builtin_ctz((unsigned)(box->y1 - box->y0))};
+}
+
+/* The deviation of a triangle inside the raster, all of whose samples in the window are valid, as a multiple of
+ * 2^-*shift. */
+static uint64_t plane_deviation(const deviation_field *s, const plane_triangle *p, const sample_window *window,
+                                int *shift) {
+    const rqt_vertex a = p->t.apex;
+    const sample_window box = box_of(a, p->t.left, p->t.right);
+    const slopes g = slopes_of(p, &box);
+    const int m = g.m;
     *shift = m;
     const bool narrow = s->relief < (INT64_C(1) << (29 - (m < 29 ? m : 29)));
     uint64_t most = 0;
+    const int32_t y0 = larger(box.y0, window->y0), y1 = smaller(box.y1, window->y1);
     for (int32_t y = y0; y <= y1; y++) {
-        int32_t xa = x0, xb = x1;
-        const int32_t from_top = y - y0, from_bottom = y1 - y;
-        if (legs_on_axes) { /* full beside the apex, one sample at the far end of the vertical leg */
-            const int32_t cut = a.y == y0 ? from_top : from_bottom;
-            if (a.x == x0)
-                xb -= cut;
-            else
-                xa += cut;
-        } else if (l.y == r.y) {
-            const int32_t cut = a.y == y0 ? from_bottom : from_top;
-            xa += cut;
-            xb -= cut;
-        } else {
-            const int32_t reach = smaller(from_top, from_bottom);
-            if (a.x == x0)
-                xa = x1 - reach;
-            else
-                xb = x0 + reach;
-        }
-        const int32_t *z = s->q + (size_t)y * (size_t)s->width + (size_t)xa;
-        const int64_t start = gx * (xa - a.x) + gy * (y - a.y);
-        uint64_t d;
-        if (narrow)
-            d = row_deviation_32(z, xb - xa + 1, (uint32_t)za, m, (uint32_t)start, (uint32_t)gx);
-        else
-            d = row_deviation_64(z, xb - xa + 1, za, m, start, gx);
+        const row_span span = span_of(&p->t, &box, y);
+        const int32_t xa = larger(span.x0, window->x0), xb = smaller(span.x1, window->x1);
+        if (xa > xb) continue;
+        const int32_t *z = s->q + sample_index(s, xa, y);
+        const int64_t start = g.gx * (xa - a.x) + g.gy * (y - a.y);
+        const uint64_t d =
+            narrow ? s->kernels->row_32(z, xb - xa + 1, (uint32_t)p->apex, m, (uint32_t)start, (uint32_t)g.gx)
+                   : s->kernels->row_64(z, xb - xa + 1, p->apex, m, start, g.gx);
         if (d > most) most = d;
     }
     return most;
+}
+
+/* What samples there are in the window of a triangle that is not clamped. */
+static int state_in(const deviation_field *s, const rqt_triangle *t, const sample_window *window) {
+    const sample_window box = box_of(t->apex, t->left, t->right);
+    const int32_t y0 = larger(box.y0, window->y0), y1 = smaller(box.y1, window->y1);
+    int state = 0;
+    for (int32_t y = y0; y <= y1 && state != (HAS_VALID | HAS_VOID); y++) {
+        const row_span span = span_of(t, &box, y);
+        const int32_t xa = larger(span.x0, window->x0), xb = smaller(span.x1, window->x1);
+        if (xa > xb) continue;
+        if (!s->valid) return HAS_VALID;
+        const uint8_t *valid = s->valid + sample_index(s, xa, y);
+        if (memchr(valid, 0, (size_t)(xb - xa + 1))) state |= HAS_VOID;
+        if (memchr(valid, 1, (size_t)(xb - xa + 1))) state |= HAS_VALID;
+    }
+    return state;
 }
 
 /* ------------------------------------------------------------------------------------ any triangle at all */
@@ -115,95 +155,143 @@ static int64_t floor_divide(int64_t a, int64_t b) {
     return a / b - (a % b != 0 && (a % b < 0) != (b < 0));
 }
 
-typedef struct scan {
-    int state;                   /* HAS_VALID | HAS_VOID over the closed triangle */
-    unsigned __int128 deviation; /* largest |denominator * (z - plane)| over its valid samples */
-    uint64_t denominator;        /* twice its area */
-} scan;
+/* A clamped triangle: any triangle of samples, counter-clockwise or made so. */
+typedef struct sample_triangle {
+    rqt_vertex corner[4]; /* the first one again at the end */
+    int64_t area;         /* twice */
+    __int128 gx, gy;      /* gradients times `area` */
+    int32_t base;         /* height of the first corner */
+    bool in_doubles;      /* its plane is exact in doubles: every term and sum is below 2^53 */
+} sample_triangle;
 
-/* Every sample of the clamped triangle, by its three edges. measure: its corners are valid, so there is a plane. */
-static scan scan_triangle(const deviation_field *s, rqt_vertex a, rqt_vertex l, rqt_vertex r, bool measure) {
-    scan out = {0, 0, 0};
+static sample_triangle sample_triangle_of(const deviation_field *s, const plane_triangle *p) {
+    const rqt_vertex a = rqt_vertex_clamp(&s->lattice, p->t.apex);
+    rqt_vertex l = rqt_vertex_clamp(&s->lattice, p->t.left), r = rqt_vertex_clamp(&s->lattice, p->t.right);
+    int64_t dl = (int64_t)p->left - p->apex, dr = (int64_t)p->right - p->apex;
     int64_t area = (int64_t)(l.x - a.x) * (r.y - a.y) - (int64_t)(r.x - a.x) * (l.y - a.y);
     if (area < 0) {
         const rqt_vertex swap = l;
+        const int64_t difference = dl;
         l = r;
         r = swap;
+        dl = dr;
+        dr = difference;
         area = -area;
     }
-    out.denominator = (uint64_t)area;
-    const int32_t za = height_at(s, a.x, a.y), zl = height_at(s, l.x, l.y), zr = height_at(s, r.x, r.y);
-    const int64_t dl = (int64_t)zl - za, dr = (int64_t)zr - za;
-    const __int128 gx = (__int128)dl * (r.y - a.y) - (__int128)dr * (l.y - a.y);
-    const __int128 gy = (__int128)dr * (l.x - a.x) - (__int128)dl * (r.x - a.x);
-    const rqt_vertex corner[4] = {a, l, r, a};
-    const int32_t x0 = smaller(smaller(a.x, l.x), r.x), x1 = larger(larger(a.x, l.x), r.x);
-    const int32_t y0 = smaller(smaller(a.y, l.y), r.y), y1 = larger(larger(a.y, l.y), r.y);
-    /* |area * dz| + |gx * dx| + |gy * dy| in 64 bits? Both gradients are at most 2 * relief * leg. */
-    const int64_t leg = larger(x1 - x0, y1 - y0);
-    const bool narrow = (__int128)s->relief * leg * leg * 5 < ((__int128)1 << 62);
+    const sample_window box = box_of(a, l, r);
+    const int64_t leg = larger(box.x1 - box.x0, box.y1 - box.y0);
+    /* |area * dz| + |gx * dx| + |gy * dy|, where both gradients are at most 2 * relief * leg. */
+    const bool in_doubles = (__int128)s->relief * leg * leg * 5 < (__int128)1 << 53;
+    return (sample_triangle){.corner = {a, l, r, a},
+                             .area = area,
+                             .gx = (__int128)dl * (r.y - a.y) - (__int128)dr * (l.y - a.y),
+                             .gy = (__int128)dr * (l.x - a.x) - (__int128)dl * (r.x - a.x),
+                             .base = p->apex,
+                             .in_doubles = in_doubles};
+}
+
+/* The samples of row y, by the three edges. */
+static row_span span_by_edges(const sample_triangle *t, int32_t x0, int32_t x1, int32_t y) {
+    int64_t xa = x0, xb = x1;
+    for (int e = 0; e < 3; e++) { /* inside: dx*(y-py) - dy*(x-px) >= 0 */
+        const rqt_vertex p = t->corner[e], next = t->corner[e + 1];
+        const int64_t dx = next.x - p.x, dy = next.y - p.y;
+        const int64_t c = dx * (y - p.y) + dy * p.x;
+        if (dy > 0) {
+            const int64_t most = floor_divide(c, dy);
+            if (most < xb) xb = most;
+        } else if (dy < 0) {
+            const int64_t least = -floor_divide(c, -dy);
+            if (least > xa) xa = least;
+        } else if (c < 0) {
+            xb = xa - 1;
+        }
+    }
+    return xa > xb ? (row_span){1, 0} : (row_span){(int32_t)xa, (int32_t)xb};
+}
+
+typedef struct scan {
+    int state;
+    unsigned __int128 deviation; /* largest |area * (z - plane)| over the valid samples */
+} scan;
+
+/* n valid samples from (x,y) on. */
+static unsigned __int128 run_deviation(const deviation_field *s, const sample_triangle *t, int32_t x, int32_t y,
+                                       int32_t n) {
+    const rqt_vertex a = t->corner[0];
+    const int32_t *z = s->q + sample_index(s, x, y);
+    if (t->in_doubles) {
+        const double gx = (double)(int64_t)t->gx, gy = (double)(int64_t)t->gy;
+        const double start = gx * (x - a.x) + gy * (y - a.y);
+        return (unsigned __int128)s->kernels->row_double(z, n, t->base, (double)t->area, start, gx);
+    }
+    unsigned __int128 most = 0;
+    for (int32_t i = 0; i < n; i++) {
+        const __int128 d =
+            (__int128)t->area * ((int64_t)z[i] - t->base) - t->gx * (x + i - a.x) - t->gy * (y - a.y);
+        const unsigned __int128 size = (unsigned __int128)(d < 0 ? -d : d);
+        if (size > most) most = size;
+    }
+    return most;
+}
+
+/* The samples of a triangle in a window. measure: there is a plane. */
+static scan scan_triangle(const deviation_field *s, const sample_triangle *t, const sample_window *window,
+                          bool measure) {
+    scan out = {0, 0};
+    const sample_window box = box_of(t->corner[0], t->corner[1], t->corner[2]);
+    const int32_t x0 = larger(box.x0, window->x0), x1 = smaller(box.x1, window->x1);
+    const int32_t y0 = larger(box.y0, window->y0), y1 = smaller(box.y1, window->y1);
     for (int32_t y = y0; y <= y1; y++) {
-        int64_t xa = x0, xb = x1;
-        for (int e = 0; e < 3; e++) { /* inside: dx*(y-py) - dy*(x-px) >= 0 */
-            const int64_t dx = corner[e + 1].x - corner[e].x, dy = corner[e + 1].y - corner[e].y;
-            const int64_t c = dx * (y - corner[e].y) + dy * corner[e].x;
-            if (dy > 0) {
-                const int64_t most = floor_divide(c, dy);
-                if (most < xb) xb = most;
-            } else if (dy < 0) {
-                const int64_t least = -floor_divide(c, -dy);
-                if (least > xa) xa = least;
-            } else if (c < 0) {
-                xb = xa - 1;
-            }
-        }
-        const size_t row = (size_t)y * (size_t)s->width;
-        for (int64_t x = xa; x <= xb; x++) {
-            if (s->valid && !s->valid[row + (size_t)x]) {
-                out.state |= HAS_VOID;
-                continue;
-            }
-            out.state |= HAS_VALID;
-            if (!measure) continue;
-            const int64_t dz = (int64_t)s->q[row + (size_t)x] - za;
-            unsigned __int128 size;
-            if (narrow) {
-                const int64_t d = area * dz - (int64_t)gx * (x - a.x) - (int64_t)gy * (y - a.y);
-                size = (unsigned __int128)(d < 0 ? -d : d);
+        const row_span span = span_by_edges(t, x0, x1, y);
+        for (int32_t x = span.x0; x <= span.x1;) { /* run by run of valid samples */
+            int32_t n = span.x1 - x + 1;
+            if (s->valid) {
+                const uint8_t *valid = s->valid + sample_index(s, x, y);
+                const uint8_t *const end = memchr(valid, *valid ? 0 : 1, (size_t)n);
+                if (end) n = (int32_t)(end - valid);
+                out.state |= *valid ? HAS_VALID : HAS_VOID;
+                if (!*valid) {
+                    x += n;
+                    continue;
+                }
             } else {
-                const __int128 d = (__int128)area * dz - gx * (x - a.x) - gy * (y - a.y);
-                size = (unsigned __int128)(d < 0 ? -d : d);
+                out.state |= HAS_VALID;
             }
+            const unsigned __int128 size = measure ? run_deviation(s, t, x, y, n) : 0;
             if (size > out.deviation) out.deviation = size;
+            x += n;
         }
     }
     return out;
 }
 
-static rqt_code scan_code(const deviation_field *s, const scan *found) {
-    return rqt_code_from_quanta(&s->scale.unit, (uint64_t)(found->deviation >> 64), (uint64_t)found->deviation,
-                                found->denominator);
-}
-
-static rqt_code outline_code(const deviation_field *s, rqt_vertex a, rqt_vertex l, rqt_vertex r) {
-    const int32_t across = larger(larger(a.x, l.x), r.x) - smaller(smaller(a.x, l.x), r.x);
-    const int32_t down = larger(larger(a.y, l.y), r.y) - smaller(smaller(a.y, l.y), r.y);
-    return rqt_code_from_ground(larger(across, down), s->cost.cell, s->cost.c);
-}
-
-triangle_error irregular_error(const deviation_field *s, const rqt_triangle *t, int known_state) {
-    const rqt_vertex a = rqt_vertex_clamp(&s->lattice, t->apex), l = rqt_vertex_clamp(&s->lattice, t->left),
-                     r = rqt_vertex_clamp(&s->lattice, t->right);
-    const bool has_plane = valid_at(s, a.x, a.y) && valid_at(s, l.x, l.y) && valid_at(s, r.x, r.y);
-    scan found = {known_state, 0, 1};
-    if (known_state < 0 || has_plane) found = scan_triangle(s, a, l, r, has_plane);
-    triangle_error out = {found.state, has_plane ? scan_code(s, &found) : 0, false};
-    out.mixed = found.state == (HAS_VALID | HAS_VOID);
-    if (out.mixed) {
-        const rqt_code ground = outline_code(s, a, l, r);
-        if (ground > out.code) out.code = ground;
+triangle_part measure_triangle(const deviation_field *s, const plane_triangle *t, const sample_window *window) {
+    triangle_part out = {0, 0};
+    if (!is_clamped(s, &t->t)) {
+        out.state = state_in(s, &t->t, window);
+        if (out.state == HAS_VOID || out.state == 0 || !t->has_plane) return out;
+        if (out.state == HAS_VALID) {
+            int shift;
+            const uint64_t deviation = plane_deviation(s, t, window, &shift);
+            out.code = code_of_binary(&s->scale, deviation, shift);
+            return out;
+        }
     }
+    /* Clamped triangles do not nest, and have no power of two as their denominator. */
+    const sample_triangle clamped = sample_triangle_of(s, t);
+    const scan found = scan_triangle(s, &clamped, window, t->has_plane);
+    out.state = found.state;
+    if (t->has_plane)
+        out.code = rqt_code_from_quanta(&s->scale.unit, (uint64_t)(found.deviation >> 64),
+                                        (uint64_t)found.deviation, (uint64_t)clamped.area);
     return out;
+}
+
+rqt_code outline_code(const deviation_field *s, const rqt_triangle *t) {
+    const sample_window box = box_of(rqt_vertex_clamp(&s->lattice, t->apex), rqt_vertex_clamp(&s->lattice, t->left),
+                                     rqt_vertex_clamp(&s->lattice, t->right));
+    return rqt_code_from_ground(larger(box.x1 - box.x0, box.y1 - box.y0), s->cost.cell, s->cost.c);
 }
 
 int64_t relief_of(const rqt_grid *grid) {

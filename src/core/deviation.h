@@ -1,46 +1,55 @@
-/* deviation.h - what one bintree triangle of a raster deviates from its samples. deviation.c */
+/* deviation.h - what the samples of one bintree triangle deviate from its plane. deviation.c */
 #ifndef RQT_DEVIATION_H
 #define RQT_DEVIATION_H
 
 #include "internal.h"
+#include "error_kernels.h"
 
 enum { HAS_VALID = 1, HAS_VOID = 2 }; /* what samples a closed triangle holds */
 
+/* A terrain, and those of its rows that are at hand. */
 typedef struct deviation_field {
     rqt_lattice lattice;
     int32_t width, height;
-    const int32_t *q;
+    int32_t first_row;    /* of the terrain, the first row of q and valid */
+    const int32_t *q;     /* rows of `width` values */
     const uint8_t *valid; /* NULL: all */
     code_scale scale;
     rqt_void_cost cost;
     int64_t relief; /* largest difference of two valid heights */
+    const error_kernels *kernels;
 } deviation_field;
 
-static inline int32_t height_at(const deviation_field *s, int32_t x, int32_t y) {
-    const int32_t cx = x < s->width ? x : s->width - 1, cy = y < s->height ? y : s->height - 1;
-    return s->q[(size_t)cy * (size_t)s->width + (size_t)cx];
+/* Samples, both ends included. */
+typedef struct sample_window {
+    int32_t x0, y0, x1, y1;
+} sample_window;
+
+/* A triangle of the lattice with the heights of its corners, which need not be at hand in the field. */
+typedef struct plane_triangle {
+    rqt_triangle t;
+    int32_t apex, left, right; /* heights */
+    bool has_plane;            /* all three are valid */
+} plane_triangle;
+
+typedef struct triangle_part {
+    int state;     /* HAS_VALID | HAS_VOID of the samples looked at; 0 where there are none */
+    rqt_code code; /* of their largest deviation; 0 where there is no plane */
+} triangle_part;
+
+static inline size_t sample_index(const deviation_field *s, int32_t x, int32_t y) {
+    return (size_t)(y - s->first_row) * (size_t)s->width + (size_t)x;
 }
 
-static inline bool valid_at(const deviation_field *s, int32_t x, int32_t y) {
-    if (!s->valid) return true;
-    const int32_t cx = x < s->width ? x : s->width - 1, cy = y < s->height ? y : s->height - 1;
-    return s->valid[(size_t)cy * (size_t)s->width + (size_t)cx] != 0;
-}
-
-static inline int state_at(const deviation_field *s, int32_t x, int32_t y) {
-    return valid_at(s, x, y) ? HAS_VALID : HAS_VOID;
-}
-
-typedef struct triangle_error {
-    int state; /* HAS_VALID | HAS_VOID over the closed triangle */
-    rqt_code code;
-    bool mixed;
-} triangle_error;
-
-/* The deviation of a triangle inside the raster whose samples are all valid, as a multiple of 2^-*shift quanta. */
-uint64_t plane_deviation(const deviation_field *s, const rqt_triangle *t, int *shift);
-/* A triangle that is mixed, or clamped, or both, with an area. known_state < 0: to be found out. */
-triangle_error irregular_error(const deviation_field *s, const rqt_triangle *t, int known_state);
+/* Does the clamped triangle have an area? Those that have none cost nothing and are never mixed. */
+bool triangle_has_area(const deviation_field *s, const rqt_triangle *t);
+/* The triangle with the heights of its corners, all of which are in rows at hand. */
+plane_triangle triangle_of_samples(const deviation_field *s, const rqt_triangle *t);
+/* The part of a triangle with an area that lies in a window of rows at hand. Parts whose windows cover a triangle
+ * add up to it: states by "or", codes by their maximum. */
+triangle_part measure_triangle(const deviation_field *s, const plane_triangle *t, const sample_window *window);
+/* What a mixed triangle costs at least. */
+rqt_code outline_code(const deviation_field *s, const rqt_triangle *t);
 /* The largest difference of two valid heights. */
 int64_t relief_of(const rqt_grid *grid);
 

@@ -1,161 +1,158 @@
-/* error.c - e(P) and the outline bit x(P) of every lattice vertex: exact, over all samples.
+/* error.c - e(P) and the outline bit x(P) of every lattice vertex of a raster in memory: exact, over all samples.
  *
- * One walk down the bintree from the two halves of the root, one visit per triangle, children before parents. What
- * a visit computes belongs to the triangle's split vertex, where the two triangles of a diamond meet in a maximum.
- * The triangles of a 2 by 2 cell, half of all, are written out; deviation.c knows all others.
- *
- * Triangles of zero area (past the last column or row) cost nothing and are never mixed.
+ * The same tiles as a sweep's (sweep.c), one after the other. What they find goes into one array; the few vertices
+ * past the last sample sit in extra columns and rows.
  */
-#include "deviation.h"
+#include "error_tile.h"
 
-typedef struct solver {
-    deviation_field field;
-    rqt_errors *errors;
-    bool (*progress)(void *, double);
-    void *context;
-    int report_below; /* log2 of the size of triangles after which progress is reported */
-    double done, step;
-    bool stopped;
-} solver;
+#define TILE_B 8 /* 2^8 + 1 samples a side: 264 kB of heights, half of a small second-level cache */
 
-static void raise_error(solver *s, rqt_vertex v, rqt_code code, bool mixed) {
-    const int32_t column = lattice_slot(v.x, s->field.width), row = lattice_slot(v.y, s->field.height);
-    const size_t at = (size_t)row * (size_t)s->errors->columns + (size_t)column;
-    if (code > s->errors->code[at]) s->errors->code[at] = code;
-    if (mixed) {
-        s->errors->outline[at] = 1;
-        s->errors->any_outline = true;
-    }
-}
-
-static int32_t smaller(int32_t a, int32_t b) {
-    return a < b ? a : b;
-}
-static int32_t larger(int32_t a, int32_t b) {
-    return a > b ? a : b;
-}
-
-/* ------------------------------------------------------------------------------------------------ the walk */
-
-static rqt_vertex between(rqt_vertex a, rqt_vertex b) {
-    return (rqt_vertex){(a.x + b.x) / 2, (a.y + b.y) / 2};
-}
-
-static int visit_irregular(solver *s, const rqt_triangle *t, rqt_vertex split, int known_state) {
-    const triangle_error found = irregular_error(&s->field, t, known_state);
-    raise_error(s, split, found.code, found.mixed);
-    return found.state;
-}
-
-/* Half of a 2 by 2 cell inside the raster: its own split vertex is the cell's centre, those of its two children are
- * the midpoints of its legs, and its other samples are its corners. */
-static int visit_small(solver *s, const rqt_triangle *t) {
-    const rqt_vertex m = between(t->left, t->right), p = between(t->apex, t->left), n = between(t->apex, t->right);
-    if (s->field.valid) {
-        const int state = state_at(&s->field, t->apex.x, t->apex.y) | state_at(&s->field, t->left.x, t->left.y) |
-                          state_at(&s->field, t->right.x, t->right.y) | state_at(&s->field, m.x, m.y) |
-                          state_at(&s->field, p.x, p.y) | state_at(&s->field, n.x, n.y);
-        if (state == HAS_VOID) return state;
-        if (state != HAS_VALID) {
-            (void)visit_irregular(s, &(rqt_triangle){m, t->left, t->apex}, p, -1);
-            (void)visit_irregular(s, &(rqt_triangle){m, t->apex, t->right}, n, -1);
-            return visit_irregular(s, t, m, state);
-        }
-    }
-    const int64_t za = height_at(&s->field, t->apex.x, t->apex.y), zl = height_at(&s->field, t->left.x, t->left.y),
-                  zr = height_at(&s->field, t->right.x, t->right.y);
-    int64_t dm = 2 * (int64_t)height_at(&s->field, m.x, m.y) - zl - zr,
-            dp = 2 * (int64_t)height_at(&s->field, p.x, p.y) - za - zl,
-            dn = 2 * (int64_t)height_at(&s->field, n.x, n.y) - za - zr;
-    dm = dm < 0 ? -dm : dm;
-    dp = dp < 0 ? -dp : dp;
-    dn = dn < 0 ? -dn : dn;
-    const int64_t most = dm > dp ? (dm > dn ? dm : dn) : (dp > dn ? dp : dn);
-    raise_error(s, p, code_of_binary(&s->field.scale, (uint64_t)dp, 1), false);
-    raise_error(s, n, code_of_binary(&s->field.scale, (uint64_t)dn, 1), false);
-    raise_error(s, m, code_of_binary(&s->field.scale, (uint64_t)most, 1), false);
-    return HAS_VALID;
-}
-
-/* size: log2 of the triangle's area in half cells. Returns what samples the closed triangle holds; 0 where its area
- * is zero. */
-static int visit(solver *s, const rqt_triangle *t, int size) {
-    const rqt_vertex a = t->apex, l = t->left, r = t->right;
-    if (s->stopped) return 0;
-    if (size == s->report_below && s->progress) {
-        s->done += s->step;
-        if (!s->progress(s->context, s->done < 1 ? s->done : 1)) {
-            s->stopped = true;
-            return 0;
-        }
-    }
-    if (smaller(smaller(a.x, l.x), r.x) >= s->field.width - 1 ||
-        smaller(smaller(a.y, l.y), r.y) >= s->field.height - 1)
-        return 0;
-    const bool clamped =
-        larger(larger(a.x, l.x), r.x) >= s->field.width || larger(larger(a.y, l.y), r.y) >= s->field.height;
-    if (size == 0) /* a half cell: nothing to split, and never clamped, or it would have no area */
-        return state_at(&s->field, a.x, a.y) | state_at(&s->field, l.x, l.y) | state_at(&s->field, r.x, r.y);
-    if (size == 2 && l.x != r.x && l.y != r.y && !clamped) return visit_small(s, t);
-    const rqt_vertex m = between(l, r);
-    const int state = visit(s, &(rqt_triangle){m, l, a}, size - 1) | visit(s, &(rqt_triangle){m, a, r}, size - 1);
-    if (s->stopped) return 0;
-    /* Clamped triangles do not nest: a child may reach over its parent's edge. */
-    if (clamped) return visit_irregular(s, t, m, -1);
-    if (state == HAS_VOID) return state;
-    if (state != HAS_VALID) return visit_irregular(s, t, m, state);
-    int shift;
-    const uint64_t deviation = plane_deviation(&s->field, t, &shift);
-    raise_error(s, m, code_of_binary(&s->field.scale, deviation, shift), false);
-    return state;
+static int smaller_b(const rqt_lattice *lattice) {
+    return lattice->K < TILE_B ? lattice->K : TILE_B;
 }
 
 size_t rqt_errors_bytes(const rqt_lattice *lattice) {
+    const int b = smaller_b(lattice);
     return (size_t)lattice_slots(lattice, lattice->width) * (size_t)lattice_slots(lattice, lattice->height) *
-           (sizeof(rqt_code) + 1);
+               (sizeof(rqt_code) + 1) +
+           coarse_bytes(lattice, b, true) + tile_bytes(lattice, b, true);
 }
 
-rqt_status rqt_errors_compute(const rqt_grid *grid, const rqt_unit *unit, const rqt_void_cost *cost,
-                              const rqt_allocator *allocator, bool (*progress)(void *context, double done),
-                              void *context, rqt_errors *errors) {
-    memset(errors, 0, sizeof *errors);
-    if (!rqt_unit_is_valid(unit) || !(cost->cell > 0) || !(cost->c > 0)) return RQT_INVALID;
-    const rqt_lattice *lattice = &grid->lattice;
+static rqt_status take_errors(const rqt_lattice *lattice, const rqt_allocator *allocator, rqt_errors *errors) {
     errors->lattice = *lattice;
     errors->columns = lattice_slots(lattice, lattice->width);
     errors->rows = lattice_slots(lattice, lattice->height);
     const size_t n = (size_t)errors->columns * (size_t)errors->rows;
     errors->code = memory_take(allocator, n * sizeof *errors->code);
     errors->outline = memory_take(allocator, n);
-    if (!errors->code || !errors->outline) {
-        rqt_errors_free(errors, allocator);
-        return RQT_NO_MEMORY;
-    }
+    if (!errors->code || !errors->outline) return RQT_NO_MEMORY;
     memset(errors->code, 0, n * sizeof *errors->code);
     memset(errors->outline, 0, n);
-    const int whole = 2 * lattice->K;
-    solver s = {.field = {.lattice = *lattice,
-                          .width = lattice->width,
-                          .height = lattice->height,
-                          .q = grid->q,
-                          .valid = grid->valid,
-                          .cost = *cost,
-                          .relief = relief_of(grid)},
-                .errors = errors,
-                .progress = progress,
-                .context = context,
-                .report_below = whole > 8 ? whole - 8 : -1,
-                .step = 1.0 / 512};
-    code_scale_init(&s.field.scale, unit);
-    const int32_t side = 1 << lattice->K;
-    const rqt_vertex nw = {0, 0}, ne = {side, 0}, sw = {0, side}, se = {side, side};
-    (void)visit(&s, &(rqt_triangle){ne, nw, se}, whole);
-    (void)visit(&s, &(rqt_triangle){sw, se, nw}, whole);
-    if (s.stopped) {
-        rqt_errors_free(errors, allocator);
-        return RQT_INTERRUPTED;
-    }
     return RQT_OK;
+}
+
+static void raise_at(rqt_errors *errors, size_t at, rqt_code code, uint8_t outline) {
+    if (code > errors->code[at]) errors->code[at] = code;
+    errors->outline[at] |= outline;
+}
+
+/* The vertices of row `line` of a tile, from column x on. */
+static void take_row(rqt_errors *errors, const error_tile *tile, int32_t line) {
+    const int32_t side = 1 << tile->b, row = lattice_slot(tile->y + line, errors->lattice.height);
+    if (row < 0) return;
+    const rqt_code *const code = tile->code + (size_t)line * tile->stride;
+    const uint8_t *const outline = tile->any_outline ? tile->outline + (size_t)line * tile->stride : NULL;
+    const size_t to = (size_t)row * (size_t)errors->columns;
+    int32_t x = 0;
+    if (line > 0 && line < side &&
+        tile->x + side < errors->lattice.width) { /* nobody else knows of its inner ones */
+        const size_t first = to + (size_t)tile->x + 1, n = (size_t)side - 1;
+        raise_at(errors, first - 1, code[0], outline ? outline[0] : 0);
+        memcpy(errors->code + first, code + 1, n * sizeof *code);
+        if (outline) memcpy(errors->outline + first, outline + 1, n);
+        x = side;
+    }
+    for (; x <= side; x++) {
+        const int32_t column = lattice_slot(tile->x + x, errors->lattice.width);
+        if (column >= 0) raise_at(errors, to + (size_t)column, code[x], outline ? outline[x] : 0);
+    }
+}
+
+static void take_tile(rqt_errors *errors, const error_tile *tile) {
+    for (int32_t line = 0; line <= 1 << tile->b; line++) take_row(errors, tile, line);
+    errors->any_outline = errors->any_outline || tile->any_outline;
+}
+
+/* The vertices of scale >= b. */
+static void take_coarse(rqt_errors *errors, const coarse_lattice *coarse) {
+    const int K = coarse->errors.lattice.K;
+    for (int n = 1; n <= K; n++)
+        for (int32_t j = 0; (int64_t)j << n < coarse->rows - 1; j++)
+            for (int32_t i = 0; (int64_t)i << n < coarse->columns - 1; i++) {
+                rqt_triangle triangle[CELL_TRIANGLES];
+                cell_triangles(i << n, j << n, n, triangle);
+                for (int t = 0; t < CELL_TRIANGLES; t++) {
+                    const rqt_vertex v = split_vertex(&triangle[t]);
+                    const int32_t column = lattice_slot(v.x << coarse->b, errors->lattice.width),
+                                  row = lattice_slot(v.y << coarse->b, errors->lattice.height);
+                    if (column < 0 || row < 0) continue;
+                    bool outline;
+                    const rqt_code code = rqt_errors_at(&coarse->errors, v, &outline);
+                    raise_at(errors, (size_t)row * (size_t)errors->columns + (size_t)column, code, outline);
+                }
+            }
+    errors->any_outline = errors->any_outline || coarse->errors.any_outline;
+}
+
+typedef struct watcher {
+    bool (*progress)(void *context, double done);
+    void *context;
+} watcher;
+
+static rqt_status measure_tiles(error_tile *tile, coarse_lattice *coarse, const watcher *watch,
+                                rqt_errors *errors) {
+    const rqt_lattice *lattice = &errors->lattice;
+    const int32_t across = tile_count(lattice->width, tile->b), down = tile_count(lattice->height, tile->b);
+    const double all = (double)across * down;
+    double done = 0;
+    for (int32_t j = 0; j < down; j++)
+        for (int32_t i = 0; i < across; i++) {
+            tile_measure(tile, i, j);
+            take_tile(errors, tile);
+            coarse_add(coarse, i, j, tile->upper);
+            done++;
+            if (watch->progress && !watch->progress(watch->context, done / all)) return RQT_INTERRUPTED;
+        }
+    coarse_complete(coarse);
+    take_coarse(errors, coarse);
+    return RQT_OK;
+}
+
+static rqt_status compute(const deviation_field *field, int b, const rqt_allocator *allocator, const watcher *watch,
+                          rqt_errors *errors) {
+    coarse_lattice coarse;
+    error_tile tile;
+    rqt_status status = coarse_create(&coarse, field, b, field->valid != NULL, allocator);
+    if (status != RQT_OK) return status;
+    for (int32_t y = 0; y < field->height; y++) {
+        const size_t at = sample_index(field, 0, y);
+        if (coarse_wants(&coarse, y))
+            coarse_take(&coarse, y, field->q + at, field->valid ? field->valid + at : NULL);
+    }
+    status = tile_create(&tile, &coarse, allocator);
+    if (status == RQT_OK) {
+        status = measure_tiles(&tile, &coarse, watch, errors);
+        tile_free(&tile, allocator);
+    }
+    coarse_free(&coarse, allocator);
+    return status;
+}
+
+rqt_status errors_compute(const rqt_grid *grid, const rqt_unit *unit, const rqt_void_cost *cost, int b,
+                          const error_kernels *kernels, const rqt_allocator *allocator,
+                          bool (*progress)(void *context, double done), void *context, rqt_errors *errors) {
+    memset(errors, 0, sizeof *errors);
+    if (!rqt_unit_is_valid(unit) || !(cost->cell > 0) || !(cost->c > 0)) return RQT_INVALID;
+    deviation_field field = {.lattice = grid->lattice,
+                             .width = grid->lattice.width,
+                             .height = grid->lattice.height,
+                             .q = grid->q,
+                             .valid = grid->valid,
+                             .cost = *cost,
+                             .relief = relief_of(grid),
+                             .kernels = kernels};
+    code_scale_init(&field.scale, unit);
+    rqt_status status = take_errors(&grid->lattice, allocator, errors);
+    if (status == RQT_OK) status = compute(&field, b, allocator, &(watcher){progress, context}, errors);
+    if (status != RQT_OK) rqt_errors_free(errors, allocator);
+    return status;
+}
+
+rqt_status rqt_errors_compute(const rqt_grid *grid, const rqt_unit *unit, const rqt_void_cost *cost,
+                              const rqt_allocator *allocator, bool (*progress)(void *context, double done),
+                              void *context, rqt_errors *errors) {
+    return errors_compute(grid, unit, cost, smaller_b(&grid->lattice), error_kernels_best(), allocator, progress,
+                          context, errors);
 }
 
 void rqt_errors_free(rqt_errors *errors, const rqt_allocator *allocator) {

@@ -184,7 +184,8 @@ void rqt_errors_free(rqt_errors *errors, const rqt_allocator *allocator);
  *       rqt_sweep_begin: where the rows go that are not there yet; fill them
  *       rqt_sweep_tile for every tile of the band, in any order, on any threads
  *       rqt_sweep_end: band r - 1, and after the last one that one too, is final but for vertices of scale >= b;
- *       take it (rqt_sweep_band) before the next rqt_sweep_begin
+ *       take it (rqt_sweep_band) before the next rqt_sweep_begin. begin and end are called by one thread, while no
+ *       tile is at work
  *   rqt_sweep_finish: vertices of scale >= b are final: rqt_sweep_coarse
  *
  * Codes and outline bits equal those of rqt_errors_compute and rqt_errors_saturate, for every b and any number of
@@ -197,7 +198,7 @@ typedef struct rqt_sweep_plan {
     rqt_void_cost cost;
     int32_t min_q, max_q; /* of the valid samples */
     bool has_voids;       /* false: valid is not looked at, and no memory is taken for voids */
-    int b;                /* 1 .. K; a tile takes (2^b + 1)^2 samples of working memory per worker */
+    int b;                /* 1 .. K (0 where K is); a tile takes (2^b + 1)^2 samples of working memory per worker */
     int workers;          /* threads that call rqt_sweep_tile at a time */
 } rqt_sweep_plan;
 
@@ -228,8 +229,8 @@ typedef struct rqt_band {
     int32_t band;
 } rqt_band;
 rqt_band rqt_sweep_band(const rqt_sweep *sweep, int32_t band);
-/* The code and bit of a lattice vertex in the closed band (0 <= x <= 2^K, band*2^b <= y <= (band+1)*2^b); of one
- * of scale >= b, 0. */
+/* The code and bit of a lattice vertex in the closed band (0 <= x <= 2^K, band*2^b <= y <= (band+1)*2^b; the last
+ * band also answers for what is past it, to y = 2^K); of one of scale >= b, 0. */
 rqt_code rqt_band_error(const rqt_band *band, rqt_vertex v, bool *outline);
 /* n codes and bits (outline may be NULL) of the vertices (x + i*step, y), quickly. */
 void rqt_band_errors(const rqt_band *band, int32_t x, int32_t y, int32_t step, int32_t n, rqt_code *codes,
