@@ -31,10 +31,13 @@ static void result_text(sqlite3_context *result, sqlite3_str *text) {
 static void append_header(sqlite3_str *out, const rqt_block_header *h, size_t size) {
     sqlite3_str_appendf(
         out,
-        "{\"version\":%d,\"k\":%d,\"width\":%d,\"height\":%d,\"voids\":\"%s\",\"outline\":%s,"
-        "\"height_planes\":%d,\"error_planes\":%d,\"quantum\":%!.17g,\"payload\":%lld,\"bytes\":%lld}",
+        "{\"version\":%d,\"k\":%d,\"width\":%d,\"height\":%d,\"voids\":\"%s\",\"outline\":%s,\"sparse\":%s,"
+        "\"floor\":%d,\"ground\":%d,\"kept\":%lld,\"height_planes\":%d,\"finest_planes\":%d,\"error_planes\":%d,"
+        "\"quantum\":%!.17g,\"payload\":%lld,\"bytes\":%lld}",
         h->version, h->k, h->width, h->height, h->all_void ? "all" : (h->has_voids ? "some" : "none"),
-        h->has_outline ? "true" : "false", h->height_planes, h->error_planes, h->quantum, (sqlite3_int64)h->payload,
+        h->has_outline ? "true" : "false", h->sparse ? "true" : "false", h->floor, h->ground,
+        (sqlite3_int64)(h->sparse ? h->kept : (size_t)((1 << h->k) + 1) * (size_t)((1 << h->k) + 1)),
+        h->height_planes, h->finest_planes, h->error_planes, h->quantum, (sqlite3_int64)h->payload,
         (sqlite3_int64)size);
 }
 
@@ -70,6 +73,13 @@ void call_block_check(sqlite3_context *result, int count, sqlite3_value **argume
         sqlite3_result_text(result, status == RQT_OK ? "ok" : why.text, -1, SQLITE_TRANSIENT);
 }
 
+/* Is anything stored of vertex i? */
+static bool is_kept(const rqt_block *b, size_t i) {
+    const size_t n = ((size_t)1 << b->k) + 1, last = n - 1;
+    return !b->sparse || b->error[i] > b->floor || b->flags[i] & RQT_OUTLINE ||
+           (i % n % last == 0 && i / n % last == 0);
+}
+
 static void append_grid(sqlite3_str *out, const char *title, const rqt_block *b, int what) {
     const int n = (1 << b->k) + 1;
     sqlite3_str_appendf(out, "%s\n", title);
@@ -77,7 +87,9 @@ static void append_grid(sqlite3_str *out, const char *title, const rqt_block *b,
         for (int u = 0; u < n; u++) {
             const size_t i = (size_t)v * (size_t)n + (size_t)u;
             const char *gap = u ? " " : "";
-            if (what == 0 && !(b->flags[i] & RQT_VALID))
+            if (!is_kept(b, i))
+                sqlite3_str_appendf(out, "%s.", gap);
+            else if (what == 0 && !(b->flags[i] & RQT_VALID))
                 sqlite3_str_appendf(out, "%s-", gap);
             else if (what == 1 && b->error[i] == RQT_CODE_INFINITY)
                 sqlite3_str_appendf(out, "%sinf", gap);
@@ -108,8 +120,8 @@ void call_block_dump(sqlite3_context *result, int count, sqlite3_value **argumen
     if (status == RQT_OK) {
         sqlite3_str *out = sqlite3_str_new(NULL);
         append_header(out, &header, size);
-        append_grid(out, "\nheights in quanta, - is void", &block, 0);
-        append_grid(out, "error codes", &block, 1);
+        append_grid(out, "\nheights in quanta, - is void, . is not kept", &block, 0);
+        append_grid(out, "error codes; those of the corners are in the summary", &block, 1);
         if (header.has_outline) append_grid(out, "outline bits", &block, 2);
         result_text(result, out);
     } else if (status == RQT_NO_MEMORY) {

@@ -24,7 +24,10 @@ enum {
     AT_HEIGHT = 10,
     AT_PAYLOAD = 12,
     AT_QUANTUM = 16,
-    AT_BLOCK_CHECKSUM = 24
+    AT_BLOCK_CHECKSUM = 24,
+    AT_FLOOR = 32,
+    AT_GROUND = 34,
+    AT_KEPT = 36
 };
 
 /* -------------------------------------------------------------------------------------- round trips -- */
@@ -107,6 +110,74 @@ static void a_cropped_block_repeats_its_last_heights_and_validity(void **state) 
     assert_int_equal(the_heap.live, 0);
 }
 
+static void a_sparse_block_comes_back_as_far_as_it_is_kept(void **state) {
+    (void)state;
+    random_begin(__func__);
+    static const uint32_t shares[] = {0, 0, 3, 20, 1};
+    rqt_codec *codec = new_codec();
+    for (int k = 0; k <= RQT_MAX_BLOCK_K; k++) {
+        const int n = side_of(k);
+        rqt_block block = new_block(k);
+        for (terrain what = FLAT; what < KINDS; what++)
+            for (int round = 0; round < (k < 6 ? 10 : 5); round++) {
+                fill(&block, 1 + (int)random_below((uint32_t)n), n, what, shares[round % 5],
+                     round % 3 ? LIKELY_ERRORS : ANY_ERRORS, shares[(round / 5 + round) % 5]);
+                /* few vertices far above the others, so that not all of them are kept */
+                for (size_t i = 0; i < count_of(k); i++)
+                    if (round % 3 != 2 && random_below(1u << round)) block.error[i] = (rqt_code)random_below(100);
+                const rqt_code floors[] = {100, 33000, 0, 50, 65534};
+                make_sparse(&block, floors[round % 5]);
+                assert_round_trip(codec, &block, 0.25);
+                /* What is not kept is not looked at. */
+                bytes a = encode(codec, &block, 0.25);
+                for (int i = 0; i < n * n; i++) {
+                    if (is_block_corner(k, i)) {
+                        block.error[i] = (rqt_code)random_bits();
+                        block.flags[i] ^= (uint8_t)(random_below(2) * RQT_OUTLINE);
+                    } else if (!is_kept(&block, i)) {
+                        block.q[i] = (int32_t)(uint32_t)random_bits();
+                        block.error[i] = (rqt_code)random_below(block.floor + 1u);
+                        block.flags[i] = (uint8_t)(random_bits() & ~(uint64_t)RQT_OUTLINE);
+                    } else if (!(block.flags[i] & RQT_VALID)) {
+                        block.q[i] = (int32_t)(uint32_t)random_bits();
+                    }
+                }
+                bytes b = encode(codec, &block, 0.25);
+                assert_int_equal(a.size, b.size);
+                assert_memory_equal(a.data, b.data, a.size);
+                free(a.data);
+                free(b.data);
+            }
+        rqt_block_free(&block, &allocator);
+    }
+    rqt_codec_free(codec);
+    assert_int_equal(the_heap.live, 0);
+}
+
+static void a_block_gets_its_corners_from_its_summary(void **state) {
+    (void)state;
+    random_begin(__func__);
+    for (int k = 0; k < 4; k++) {
+        rqt_block block = new_block(k), before = new_block(k);
+        const int n = side_of(k), last = n - 1;
+        fill(&block, n, n, TERRAIN, 3, ANY_ERRORS, 3);
+        memcpy(before.error, block.error, count_of(k) * sizeof *block.error);
+        memcpy(before.flags, block.flags, count_of(k));
+        rqt_summary s = {0};
+        for (int c = 0; c < 4; c++) s.corner[c] = (rqt_summary_vertex){7, (rqt_code)(100 + c), (uint8_t)c};
+        rqt_block_set_corners(&block, &s);
+        for (int i = 0; i < n * n; i++) {
+            const int c = i % n / last + 2 * (i / n / last);
+            const bool corner = is_block_corner(k, i);
+            assert_int_equal(block.error[i], corner ? 100 + c : before.error[i]);
+            assert_int_equal(block.flags[i],
+                             corner ? (before.flags[i] & RQT_VALID) | (c & RQT_OUTLINE) : before.flags[i]);
+        }
+        rqt_block_free(&block, &allocator);
+        rqt_block_free(&before, &allocator);
+    }
+}
+
 static void any_finite_quantum_above_zero_serves(void **state) {
     (void)state;
     random_begin(__func__);
@@ -119,6 +190,10 @@ static void any_finite_quantum_above_zero_serves(void **state) {
     for (size_t i = 0; i < sizeof quanta / sizeof *quanta; i++) {
         fill(&block, 17, 17, i % 2 ? FULL_RANGE : TERRAIN, 9, LIKELY_ERRORS, 9);
         assert_round_trip(codec, &block, quanta[i]);
+        make_sparse(&block, 33000);
+        assert_round_trip(codec, &block, quanta[i]);
+        block.sparse = false;
+        block.floor = 0;
     }
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
         size_t size = 1;
@@ -156,44 +231,68 @@ static void equal_blocks_give_equal_bytes_whatever_lies_under_their_voids(void *
     }
 }
 
+/* The largest deviation, as a code, of the heights in the closed triangle of three places from its plane. */
+static rqt_code deviation(const rqt_block *b, const rqt_unit *unit, const int p[3][2]) {
+    const int n = side_of(b->k);
+    const int64_t area =
+        (int64_t)(p[1][0] - p[0][0]) * (p[2][1] - p[0][1]) - (int64_t)(p[2][0] - p[0][0]) * (p[1][1] - p[0][1]);
+    int64_t most = 0;
+    for (int y = 0; y < n; y++)
+        for (int x = 0; x < n; x++) {
+            int64_t sum = 0, least = INT64_MAX;
+            for (int c = 0; c < 3; c++) {
+                const int *u = p[(c + 1) % 3], *v = p[(c + 2) % 3];
+                int64_t share = (int64_t)(u[0] - x) * (v[1] - y) - (int64_t)(v[0] - x) * (u[1] - y);
+                if (area < 0) share = -share;
+                if (share < least) least = share;
+                sum += share * b->q[p[c][1] * n + p[c][0]];
+            }
+            const int64_t off = llabs(llabs(area) * b->q[y * n + x] - sum);
+            if (least >= 0 && off > most) most = off;
+        }
+    return rqt_code_from_quanta(unit, 0, (uint64_t)most, (uint64_t)llabs(area));
+}
+
 static void errors_that_their_heights_imply_take_no_plane(void **state) {
     (void)state;
     random_begin(__func__);
-    /* At stride 1 the error of a side of the finest scale is its distance from its midpoint, and that of a centre
-     * the largest of its own and its sides'. A quantum of a tenth is no binary fraction: prediction must not slip.
-     */
+    /* At the two finest scales the error of a vertex is what the heights in its diamond say, or a child's: those of
+     * the vertices inside a block are known from the block. A quantum of a tenth is no binary fraction: prediction
+     * must not slip. */
     rqt_codec *codec = new_codec();
-    rqt_block block = new_block(2);
-    fill(&block, 5, 5, TERRAIN, 0, NO_ERRORS, 0);
-    for (int i = 0; i < 25; i++) block.q[i] = 10 * i * i;
+    rqt_block block = new_block(3);
+    const int n = 9;
+    fill(&block, n, n, NOISE, 0, NO_ERRORS, 0);
     const rqt_unit unit = {0, 10, 1, 1, 1.0, 0.0};
-#define SIDE(at, a, b) \
-    rqt_code_from_quanta(&unit, 0, (uint64_t)llabs(2LL * block.q[at] - block.q[a] - block.q[b]), 2)
-#define RAISE(at, by) block.error[at] = block.error[by] > block.error[at] ? block.error[by] : block.error[at]
-    for (int scale = 1; scale <= 2; scale++) {
-        for (int y = 0; y < 5; y += scale)
-            for (int x = y / scale % 2 ? 0 : scale; x < 5; x += 2 * scale) {
-                const int at = y * 5 + x, step = y / scale % 2 ? 5 * scale : scale;
-                block.error[at] = SIDE(at, at - step, at + step);
-                for (int c = 0; c < 4 && scale == 2; c++) {
-                    const int cx = x + (c % 2 ? 1 : -1), cy = y + (c / 2 ? 1 : -1);
-                    if (cx >= 0 && cx < 5 && cy >= 0 && cy < 5) RAISE(at, cy * 5 + cx);
+    for (int q = 1; q <= 4; q *= 2)
+        for (int centre = 0; centre < 2; centre++)
+            for (int y = 0; y < n; y += q)
+                for (int x = 0; x < n; x += q) {
+                    if ((x / q % 2 + y / q % 2) != 1 + centre) continue;
+                    const bool odd = x / q % 2;
+                    int ax = odd ? q : 0, ay = odd ? 0 : q; /* from the vertex to an end of its hypotenuse */
+                    if (centre) ax = q, ay = (x ^ y) / q & 2 ? -q : q;
+                    for (int half = -1; half <= 1 && q < 4; half += 2) {
+                        const int p[3][2] = {{x - half * ay, y + half * ax}, {x - ax, y - ay}, {x + ax, y + ay}};
+                        if (p[0][0] < 0 || p[0][1] < 0 || p[0][0] >= n || p[0][1] >= n) continue;
+                        const rqt_code code = deviation(&block, &unit, p);
+                        if (code > block.error[y * n + x]) block.error[y * n + x] = code;
+                    }
+                    if (q == 4 && !centre) { /* of the third scale the midpoint alone is looked at */
+                        const int64_t off = llabs(2LL * block.q[y * n + x] - block.q[(y - ay) * n + x - ax] -
+                                                  block.q[(y + ay) * n + x + ax]);
+                        const rqt_code code = rqt_code_from_quanta(&unit, 0, (uint64_t)off, 2);
+                        if (code > block.error[y * n + x]) block.error[y * n + x] = code;
+                    }
+                    int parents[2];
+                    for (int c = parents_of(3, y * n + x, parents); c-- > 0;)
+                        if (block.error[parents[c]] < block.error[y * n + x])
+                            block.error[parents[c]] = block.error[y * n + x];
                 }
-            }
-        for (int y = scale; y < 5; y += 2 * scale)
-            for (int x = scale; x < 5; x += 2 * scale) {
-                const int at = y * 5 + x, turn = (x - scale) / (2 * scale) % 2 != (y - scale) / (2 * scale) % 2;
-                const int step = scale * (turn ? 4 : 6);
-                block.error[at] = scale == 1 ? SIDE(at, at - step, at + step) : 0;
-                RAISE(at, at - scale);
-                RAISE(at, at + scale);
-                RAISE(at, at - 5 * scale);
-                RAISE(at, at + 5 * scale);
-            }
-    }
     bytes b = encode(codec, &block, 0.1);
     rqt_block_header h;
     assert_int_equal(rqt_block_info(b.data, b.size, &h, NULL), RQT_OK);
+    assert_int_equal(h.finest_planes, 0);
     assert_int_equal(h.error_planes, 0);
     free(b.data);
     rqt_block_free(&block, &allocator);
@@ -238,6 +337,17 @@ static void what_cannot_be_stored_is_refused(void **state) {
     good.flags[70] |= 4;
     REFUSED();
     good.flags[70] &= 3;
+    b = good;
+    b.floor = 1; /* of a block that is not sparse */
+    REFUSED();
+    good.sparse = true;
+    b = good;
+    b.floor = 40000;
+    good.error[1] = 40001; /* kept, and its parent is not */
+    REFUSED();
+    good.error[1] = 0;
+    good.sparse = false;
+    b = good;
     assert_int_equal(rqt_block_encode(codec, &b, 1, buffer, &size), RQT_OK);
     assert_int_equal(rqt_block_bound(-1), 0);
     assert_int_equal(rqt_block_bound(RQT_MAX_BLOCK_K + 1), 0);
@@ -279,6 +389,7 @@ static void every_truncation_of_a_block_is_noticed(void **state) {
     for (int k = 0; k <= 6; k += 3) {
         rqt_block block = new_block(k);
         fill(&block, side_of(k), side_of(k), TERRAIN, 8, LIKELY_ERRORS, 8);
+        if (k == 3) make_sparse(&block, 33200);
         bytes b = encode(codec, &block, 1);
         for (size_t size = 0; size < b.size; size++) {
             uint8_t *cut = copy_of(b.data, size);
@@ -303,6 +414,7 @@ static void every_flipped_bit_of_a_block_is_noticed(void **state) {
     for (int k = 0; k <= RQT_MAX_BLOCK_K; k++) {
         rqt_block block = new_block(k);
         fill(&block, side_of(k), side_of(k), k % 2 ? NOISE : TERRAIN, 8, LIKELY_ERRORS, 8);
+        if (k % 3 == 2) make_sparse(&block, 33200);
         bytes b = encode(codec, &block, 1);
         const size_t bits = 8 * b.size, trials = k <= 3 ? bits : 300;
         for (size_t i = 0; i < trials; i++) {
@@ -344,7 +456,8 @@ static void a_header_that_lies_is_found_out_under_a_good_checksum(void **state) 
     bytes b = encode(codec, &block, 1);
     rqt_block_header h;
     assert_int_equal(rqt_block_info(b.data, b.size, &h, NULL), RQT_OK);
-    assert_true(h.has_voids && h.has_outline && h.height_planes == 2 && h.error_planes == 2);
+    assert_true(h.has_voids && h.has_outline && h.height_planes == 2 && h.finest_planes == 2 &&
+                h.error_planes == 2);
     static const struct {
         size_t at;
         int bytes;
@@ -362,11 +475,15 @@ static void a_header_that_lies_is_found_out_under_a_good_checksum(void **state) 
                 {AT_FLAGS, 1, 13},
                 {AT_FLAGS, 1, 7},
                 {AT_FLAGS, 1, 69},
-                {AT_PLANES, 1, 0x25},
-                {AT_PLANES, 1, 0x32},
+                {AT_PLANES, 1, 0xA5},
+                {AT_PLANES, 1, 0xB2},
                 {AT_PLANES, 1, 0xF2},
-                {AT_PLANES, 1, 0x23},
-                {AT_PLANES, 1, 0x12},
+                {AT_PLANES, 1, 0xA3},
+                {AT_PLANES, 1, 0x92},
+                {AT_PLANES, 1, 0x62},
+                {AT_FLOOR, 2, 1},
+                {AT_KEPT, 4, 1},
+                {AT_KEPT, 4, 5},
                 {AT_WIDTH, 2, 0},
                 {AT_WIDTH, 2, 18},
                 {AT_WIDTH, 2, 13},
@@ -449,9 +566,11 @@ static void a_payload_that_lies_is_found_out_under_a_good_checksum(void **state)
         uint8_t flags, bits[2];
         rqt_status status;
     } bits[] = {{1, {0xFE, 1}, RQT_OK},      {1, {0xFF, 1}, RQT_CORRUPT}, {1, {0, 0}, RQT_CORRUPT},
-                {1, {0xFE, 3}, RQT_CORRUPT}, {1, {1, 0x80}, RQT_CORRUPT}, {4, {1, 0}, RQT_OK},
-                {4, {0xFF, 1}, RQT_OK},      {4, {0, 0}, RQT_CORRUPT},    {4, {1, 2}, RQT_CORRUPT},
-                {4, {0, 0x80}, RQT_CORRUPT}, {6, {1, 1}, RQT_OK},         {6, {1, 0x10}, RQT_CORRUPT}};
+                {1, {0xFE, 3}, RQT_CORRUPT}, {1, {1, 0x80}, RQT_CORRUPT}, {4, {2, 0}, RQT_OK},
+                {4, {0xBA, 0}, RQT_OK},      {4, {0, 0}, RQT_CORRUPT},    {4, {2, 2}, RQT_CORRUPT},
+                {4, {2, 0x80}, RQT_CORRUPT}, {4, {3, 0}, RQT_CORRUPT},    {4, {2, 1}, RQT_CORRUPT},
+                {4, {6, 0}, RQT_CORRUPT},    {4, {0x42, 0}, RQT_CORRUPT}, {6, {2, 0}, RQT_OK},
+                {6, {2, 0x10}, RQT_CORRUPT}};
     header[AT_PLANES] = 0;
     for (size_t i = 0; i < sizeof bits / sizeof *bits; i++) {
         header[AT_FLAGS] = bits[i].flags;
@@ -461,6 +580,56 @@ static void a_payload_that_lies_is_found_out_under_a_good_checksum(void **state)
         free(b.data);
     }
     header[AT_FLAGS] = 0;
+
+    /* A sparse block: an error residual for every kept vertex, then bits for the centre and the four sides. */
+    static const struct {
+        uint32_t kept;
+        size_t n;
+        uint8_t payload[6];
+        rqt_status status;
+    } sparse[] = {{5, 2, {0, 1}, RQT_OK},
+                  {5, 2, {8, 1}, RQT_OK},
+                  {5, 2, {1, 1}, RQT_CORRUPT},
+                  {5, 2, {0, 0}, RQT_CORRUPT},
+                  {5, 2, {0, 3}, RQT_CORRUPT},
+                  {5, 2, {0, 0x21}, RQT_CORRUPT},
+                  {5, 2, {0, 0x81}, RQT_CORRUPT},
+                  {4, 1, {0}, RQT_OK},
+                  {4, 1, {1}, RQT_CORRUPT},
+                  {4, 1, {2}, RQT_CORRUPT},
+                  {6, 3, {0, 0, 3}, RQT_OK},
+                  {6, 3, {0, 0, 0x11}, RQT_OK},
+                  {6, 3, {0, 0, 6}, RQT_CORRUPT},
+                  {6, 3, {0, 1, 3}, RQT_CORRUPT},
+                  {6, 3, {0, 0, 0x23}, RQT_CORRUPT},
+                  {5, 1, {1}, RQT_CORRUPT},
+                  {9, 6, {0, 0, 0, 0, 0, 31}, RQT_OK}};
+    header[AT_FLAGS] = 8;
+    header[AT_PLANES] = 0x40;
+    put16(header + AT_FLOOR, 500);
+    for (size_t i = 0; i < sizeof sparse / sizeof *sparse; i++) {
+        put32(header + AT_KEPT, sparse[i].kept);
+        b = forge(header, sparse[i].payload, sparse[i].n);
+        assert_int_equal(rqt_block_decode(codec, b.data, b.size, &scratch), sparse[i].status);
+        free(b.data);
+    }
+    static const struct {
+        size_t at;
+        uint8_t value;
+    } denied[] = {{AT_KEPT, 3},   {AT_KEPT, 10}, {AT_KEPT + 2, 1}, {AT_PLANES, 0x50}, {AT_PLANES, 0xC0},
+                  {AT_GROUND, 1}, {AT_FLAGS, 0}, {AT_FLAGS, 11},   {AT_FLAGS, 24}};
+    for (size_t i = 0; i < sizeof denied / sizeof *denied; i++) {
+        uint8_t lie[HEADER_BYTES];
+        put32(header + AT_KEPT, 5);
+        memcpy(lie, header, sizeof lie);
+        lie[denied[i].at] = denied[i].value;
+        b = forge(lie, sparse[0].payload, 2);
+        assert_corrupt(codec, b.data, b.size, &scratch, true);
+        free(b.data);
+    }
+    header[AT_FLAGS] = 0;
+    put16(header + AT_FLOOR, 0);
+    put32(header + AT_KEPT, 0);
 
     /* A frame that is sound, but of another length than the header says; with content size and without. */
     header[AT_PLANES] = 1;
@@ -497,32 +666,46 @@ static void random_payloads_under_a_good_checksum_do_no_harm(void **state) {
     (void)state;
     random_begin(__func__);
     rqt_codec *codec = new_codec();
-    for (int round = 0; round < 3000; round++) {
+    int sound[2] = {0, 0};
+    for (int round = 0; round < 20000; round++) {
         const int k = (int)random_below(5), n = side_of(k);
         uint8_t header[HEADER_BYTES] = "RQTB";
         const size_t width = 1 + random_below((uint32_t)n), height = 1 + random_below((uint32_t)n);
-        const size_t stored = width * height, count = count_of(k);
-        const uint32_t flags = random_below(8), heights = random_below(5), error = random_below(3);
+        const bool sparse = round % 2;
+        const size_t count = count_of(k), stored = width * height, half = (size_t)1 << k >> 1;
+        const size_t kept = 4 + random_below(sparse && round % 3 ? 8 : (uint32_t)count - 3) % (count - 3);
+        const size_t finest = sparse ? 0 : half * (3 * half + 2), others = (sparse ? kept : count) - 4 - finest;
+        const uint32_t flags = random_below(8) & (round % 5 ? 4 : 7), heights = random_below(5),
+                       fine = sparse ? 0 : random_below(3), error = random_below(3);
         header[AT_VERSION] = RQT_FORMAT_VERSION;
         header[AT_K] = (uint8_t)k;
-        header[AT_FLAGS] = (uint8_t)flags;
-        header[AT_PLANES] = (uint8_t)(heights | error << 4);
+        header[AT_FLAGS] = (uint8_t)(flags | (sparse ? 8 : 0));
+        header[AT_PLANES] = (uint8_t)(heights | fine << 4 | error << 6);
         put16(header + AT_WIDTH, (uint16_t)width);
         put16(header + AT_HEIGHT, (uint16_t)height);
         put_double(header + AT_QUANTUM, ldexp(1, (int)random_below(2000) - 1000));
-        const size_t size = stored * heights + count * error + (flags & 1 ? (stored + 7) / 8 : 0) +
-                            (flags & 4 ? (count + 7) / 8 : 0);
-        uint8_t *payload = take(size);
-        for (size_t i = 0; i < size; i++) payload[i] = (uint8_t)random_bits();
-        bytes b = forge(header, payload, size);
+        if (sparse) put16(header + AT_FLOOR, (uint16_t)random_below(65536));
+        if (flags & 4) put16(header + AT_GROUND, (uint16_t)random_below(65536));
+        if (sparse) put32(header + AT_KEPT, (uint32_t)kept);
+        const size_t listed = sparse ? kept : stored, known = listed * heights + finest * fine + others * error +
+                                                              (flags & 1 ? (listed + 7) / 8 : 0) +
+                                                              (flags & 4 ? ((sparse ? others : count) + 7) / 8 : 0);
+        const size_t bits = sparse ? random_below((uint32_t)(count + 7) / 8 + 1) % 4 : 0;
+        uint8_t *payload = take(known + bits);
+        /* half of them mostly zeros: residuals that make sense, so that they come further */
+        for (size_t i = 0; i < known + bits; i++)
+            payload[i] = (uint8_t)(round % 4 < 2 || random_below(4) == 0 ? random_bits() : 0);
+        bytes b = forge(header, payload, known + bits);
         rqt_block block = new_block(k);
         const rqt_status status = rqt_block_decode(codec, b.data, b.size, &block);
         assert_true(status == RQT_OK || status == RQT_CORRUPT);
+        sound[sparse] += status == RQT_OK;
         if (status == RQT_OK) assert_round_trip(codec, &block, 1);
         rqt_block_free(&block, &allocator);
         free(payload);
         free(b.data);
     }
+    assert_true(sound[0] > 100 && sound[1] > 100);
     rqt_codec_free(codec);
     assert_int_equal(the_heap.live, 0);
 }
@@ -597,6 +780,8 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_block_comes_back_whatever_its_size_heights_voids_errors_and_outline),
         cmocka_unit_test(a_cropped_block_repeats_its_last_heights_and_validity),
+        cmocka_unit_test(a_sparse_block_comes_back_as_far_as_it_is_kept),
+        cmocka_unit_test(a_block_gets_its_corners_from_its_summary),
         cmocka_unit_test(any_finite_quantum_above_zero_serves),
         cmocka_unit_test(equal_blocks_give_equal_bytes_whatever_lies_under_their_voids),
         cmocka_unit_test(errors_that_their_heights_imply_take_no_plane),

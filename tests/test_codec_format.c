@@ -31,54 +31,137 @@ static uint32_t unzigzag(uint32_t v) {
     return v % 2 ? 0 - v / 2 - 1 : v / 2;
 }
 
-static uint32_t reference_midpoint(const int32_t *q, int n, double quantum, int x, int y, int dx, int dy) {
-    const uint32_t t =
-        2 * (uint32_t)q[y * n + x] - (uint32_t)q[(y - dy) * n + x - dx] - (uint32_t)q[(y + dy) * n + x + dx];
+/* The smallest code that is not below `halves` half quanta (or quarters). */
+static uint32_t reference_length(uint32_t t, double quantum, bool quarters) {
     double h = quantum * (0.5 - ldexp(1, -21));
     h = h < ldexp(1, -90) ? ldexp(1, -90) : h > ldexp(1, 90) ? ldexp(1, 90) : h;
-    const float v = fabsf((float)(int32_t)t) * (float)h;
+    const float v = fabsf((float)(int32_t)t) * ((float)h / (quarters ? 2 : 1));
     uint32_t code = 0;
     if (v > 0) /* the smallest code c with (128 + c % 128) * 2^(c / 128 - 263) >= v */
         for (code = (uint32_t)(ilogb(v) + 256) * 128; ldexp(128 + code % 128, (int)(code / 128) - 263) < v;) code++;
     return code;
 }
 
-static void reference_code(const rqt_block_header *h, const int32_t *q, rqt_code *error, int x, int y, int q_step,
-                           bool centre, uint32_t residual) {
-    const int n = side_of(h->k), half = q_step / 2;
-    uint32_t p = 0;
-    for (int c = 0; c < 4; c++) {
-        int cx = x, cy = y;
-        if (centre) {
-            cx += c == 0 ? -q_step : c == 1 ? q_step : 0;
-            cy += c == 2 ? -q_step : c == 3 ? q_step : 0;
-        } else {
-            cx += c % 2 ? half : -half;
-            cy += c / 2 ? half : -half;
-        }
-        if ((centre || half) && cx >= 0 && cx < n && cy >= 0 && cy < n && error[cy * n + cx] > p)
-            p = error[cy * n + cx];
-    }
-    uint32_t middle = 0;
-    if (!centre) {
-        const bool even = y / q_step % 2 == 0;
-        middle = reference_midpoint(q, n, h->quantum, x, y, even ? q_step : 0, even ? 0 : q_step);
-    } else if (2 * q_step != n - 1) {
-        const bool alike = (x - q_step) / (2 * q_step) % 2 == (y - q_step) / (2 * q_step) % 2;
-        middle = reference_midpoint(q, n, h->quantum, x, y, q_step, alike ? q_step : -q_step);
-    }
-    error[y * n + x] = (rqt_code)((middle > p ? middle : p) + unzigzag(residual));
+typedef struct reference {
+    rqt_block_header h;
+    rqt_block *b;
+    int n;
+    /* the vertex at hand */
+    int x, y, q;
+    bool centre, own; /* own: the block's */
+    int end[2][2], apex[2][2], apexes;
+    int child[4][2], children;
+} reference;
+
+static int at_of(const reference *r, const int p[2]) {
+    return p[1] * r->n + p[0];
+}
+static bool in_block(const reference *r, int x, int y) {
+    return x >= 0 && y >= 0 && x < r->n && y < r->n;
 }
 
-static void reference_decode(bytes b, rqt_block *block) {
-    rqt_block_header h;
-    assert_int_equal(rqt_block_info(b.data, b.size, &h, NULL), RQT_OK);
-    const int n = side_of(h.k);
-    const size_t stored = (size_t)(h.width * h.height), count = count_of(h.k);
-    uint8_t *payload = take(h.payload);
-    assert_int_equal(ZSTD_decompress(payload, h.payload, b.data + HEADER_BYTES, b.size - HEADER_BYTES), h.payload);
-    const uint8_t *errors_at = payload + stored * (size_t)h.height_planes;
-    const uint8_t *bits = errors_at + count * (size_t)h.error_planes;
+static void reference_vertex(reference *r, int x, int y, int q) {
+    const int n = r->n;
+    r->x = x, r->y = y, r->q = q;
+    r->centre = x / q % 2 && y / q % 2;
+    r->own = r->centre && 2 * q == n - 1;
+    r->apexes = r->children = 0;
+    int dx = x / q % 2 ? q : 0, dy = x / q % 2 ? 0 : q, ax = dy, ay = dx; /* to an end, to an apex */
+    if (r->centre) {
+        const bool alike = (x - q) / (2 * q) % 2 == (y - q) / (2 * q) % 2;
+        dx = q, dy = alike ? q : -q, ax = q, ay = -dy;
+    }
+    for (int c = -1; c <= 1; c += 2) {
+        r->end[c > 0][0] = x + c * dx, r->end[c > 0][1] = y + c * dy;
+        if (!in_block(r, x + c * ax, y + c * ay)) continue;
+        r->apex[r->apexes][0] = x + c * ax, r->apex[r->apexes++][1] = y + c * ay;
+    }
+    for (int c = 0; c < 4; c++) {
+        static const int beside[4][2] = {{0, -1}, {-1, 0}, {1, 0}, {0, 1}};
+        const int cx = r->centre ? x + q * beside[c][0] : x + (c % 2 ? q / 2 : -q / 2);
+        const int cy = r->centre ? y + q * beside[c][1] : y + (c / 2 ? q / 2 : -q / 2);
+        if ((!r->centre && q == 1) || !in_block(r, cx, cy)) continue;
+        r->child[r->children][0] = cx, r->child[r->children++][1] = cy;
+    }
+}
+
+static bool is_beyond(const reference *r) {
+    return r->x - r->q >= r->h.width - 1 || r->y - r->q >= r->h.height - 1;
+}
+
+static bool expects_outline(const reference *r) {
+    const uint8_t *flags = r->b->flags, own = flags[r->y * r->n + r->x];
+    for (int c = 0; c < r->children; c++)
+        if (flags[at_of(r, r->child[c])] & RQT_OUTLINE) return true;
+    if (is_beyond(r)) return false;
+    for (int c = 0; c < r->apexes + 2; c++) {
+        const int *p = c < 2 ? r->end[c] : r->apex[c - 2];
+        if ((flags[at_of(r, p)] ^ own) & RQT_VALID) return true;
+    }
+    return false;
+}
+
+/* 4 times the height at (x,y) from the plane through the ends and an apex, all heights weighed as FORMAT.md says.
+ */
+static void quarter(const reference *r, int x, int y, const int *apex, int of_e, int of_f, uint32_t *most) {
+    const int32_t *q = r->b->q;
+    uint32_t t = 4 * (uint32_t)q[y * r->n + x] - (uint32_t)of_e * (uint32_t)q[at_of(r, r->end[0])] -
+                 (uint32_t)of_f * (uint32_t)q[at_of(r, r->end[1])];
+    if (apex) t -= (uint32_t)(4 - of_e - of_f) * (uint32_t)q[at_of(r, apex)];
+    if (t >> 31) t = 0 - t;
+    if (t > *most) *most = t;
+}
+
+static uint32_t reference_own(const reference *r) {
+    const int32_t *q = r->b->q;
+    const int at = r->y * r->n + r->x, flags = r->b->flags[at];
+    if (flags & RQT_OUTLINE) {
+        uint32_t code = r->h.ground;
+        for (int s = 1; s < r->q && code; s *= 2) code += 128;
+        return code > 65535 ? 65535 : code;
+    }
+    const uint32_t least = r->h.sparse ? r->h.floor + 1u : 0;
+    if (!(flags & RQT_VALID) || r->own || (!r->h.sparse && is_beyond(r))) return least;
+    const int *e = r->end[0], *f = r->end[1];
+    uint32_t code;
+    if (r->q == 2 && !r->h.sparse) {
+        uint32_t most = 0;
+        quarter(r, r->x, r->y, NULL, 2, 2, &most);
+        quarter(r, (r->x + e[0]) / 2, (r->y + e[1]) / 2, NULL, 3, 1, &most);
+        quarter(r, (r->x + f[0]) / 2, (r->y + f[1]) / 2, NULL, 1, 3, &most);
+        for (int c = 0; c < r->apexes; c++) {
+            const int *a = r->apex[c];
+            quarter(r, (r->x + a[0]) / 2, (r->y + a[1]) / 2, a, 1, 1, &most);
+            if (!r->centre) continue;
+            quarter(r, (a[0] + e[0]) / 2 + (f[0] - a[0]) / 4, (a[1] + e[1]) / 2 + (f[1] - a[1]) / 4, a, 2, 1,
+                    &most);
+            quarter(r, (a[0] + f[0]) / 2 + (e[0] - a[0]) / 4, (a[1] + f[1]) / 2 + (e[1] - a[1]) / 4, a, 1, 2,
+                    &most);
+        }
+        code = reference_length(most, r->h.quantum, true);
+    } else {
+        code = reference_length(2 * (uint32_t)q[at] - (uint32_t)q[at_of(r, e)] - (uint32_t)q[at_of(r, f)],
+                                r->h.quantum, false);
+    }
+    return code > least ? code : least;
+}
+
+static void reference_error(reference *r, uint32_t residual) {
+    uint32_t p = reference_own(r);
+    for (int c = 0; c < r->children; c++)
+        if (r->b->error[at_of(r, r->child[c])] > p) p = r->b->error[at_of(r, r->child[c])];
+    r->b->error[r->y * r->n + r->x] = (rqt_code)(p + unzigzag(residual));
+}
+
+static void reference_whole(reference *r, const uint8_t *payload) {
+    const rqt_block_header h = r->h;
+    const int n = r->n;
+    rqt_block *block = r->b;
+    const size_t stored = (size_t)(h.width * h.height), count = count_of(h.k), half = (size_t)(n - 1) / 2;
+    const size_t finest = half * (3 * half + 2), others = count - 4 - finest;
+    const uint8_t *finest_at = payload + stored * (size_t)h.height_planes;
+    const uint8_t *others_at = finest_at + finest * (size_t)h.finest_planes;
+    const uint8_t *bits = others_at + others * (size_t)h.error_planes;
     int32_t *q = block->q;
     for (int y = 0; y < n; y++)
         for (int x = 0; x < n; x++) {
@@ -101,23 +184,93 @@ static void reference_decode(bytes b, rqt_block *block) {
             block->flags[at] = (uint8_t)(h.has_voids ? bits[i / 8] >> i % 8 & 1 : !h.all_void);
         }
     if (h.has_voids) bits += (stored + 7) / 8;
-    if (h.has_outline)
-        for (size_t i = 0; i < count; i++)
-            if (bits[i / 8] >> i % 8 & 1) block->flags[i] |= RQT_OUTLINE;
+    memset(block->error, 0, count * sizeof *block->error);
     size_t next = 0;
-#define NEXT() plane_value(errors_at, count, h.error_planes, next++)
-    for (int step = 1; step < n - 1; step *= 2) {
-        for (int y = 0; y < n; y += step)
-            for (int x = y / step % 2 ? 0 : step; x < n; x += 2 * step)
-                reference_code(&h, q, block->error, x, y, step, false, NEXT());
-        for (int y = step; y < n; y += 2 * step)
-            for (int x = step; x < n; x += 2 * step) reference_code(&h, q, block->error, x, y, step, true, NEXT());
+    for (int step = 1; step < n - 1; step *= 2)
+        for (int centre = 0; centre < 2; centre++)
+            for (int y = 0; y < n; y += step)
+                for (int x = 0; x < n; x += step) {
+                    if (x / step % 2 + y / step % 2 != 1 + centre) continue;
+                    const int at = y * n + x;
+                    reference_vertex(r, x, y, step);
+                    if (h.has_outline && expects_outline(r) != (bits[at / 8] >> at % 8 & 1))
+                        block->flags[at] |= RQT_OUTLINE;
+                    reference_error(r, next < finest
+                                           ? plane_value(finest_at, finest, h.finest_planes, next)
+                                           : plane_value(others_at, others, h.error_planes, next - finest));
+                    next++;
+                }
+    assert_int_equal(next, count - 4);
+}
+
+static void reference_sparse(reference *r, const uint8_t *payload) {
+    const rqt_block_header h = r->h;
+    rqt_block *block = r->b;
+    const int n = r->n, last = n - 1;
+    const size_t count = count_of(h.k);
+    const uint8_t *errors_at = payload + h.kept * (size_t)h.height_planes;
+    const uint8_t *valid = errors_at + (h.kept - 4) * (size_t)h.error_planes;
+    const uint8_t *outline = valid + (h.has_voids ? (h.kept + 7) / 8 : 0);
+    const uint8_t *bits = outline + (h.has_outline ? (h.kept - 4 + 7) / 8 : 0);
+    int(*list)[3] = take((count + 4) * sizeof *list); /* x, y, q */
+    int *offers = take(count * sizeof *offers);
+    size_t listed = 0, bit = 0;
+    memset(offers, 0, count * sizeof *offers);
+    memset(block->q, 0, count * sizeof *block->q);
+    memset(block->error, 0, count * sizeof *block->error);
+    memset(block->flags, RQT_VALID, count);
+    for (int c = 0; c < 4; c++, listed++) list[c][0] = c % 2 * last, list[c][1] = c / 2 * last, list[c][2] = 0;
+#define OFFER(X, Y, Q)                                                 \
+    do {                                                               \
+        list[listed][0] = X, list[listed][1] = Y, list[listed][2] = Q; \
+        if (bits[bit / 8] >> bit % 8 & 1) listed++;                    \
+        bit++;                                                         \
+    } while (0)
+    if (h.k > 0) OFFER(last / 2, last / 2, last / 2);
+    for (size_t at = 4; at < listed; at++) {
+        reference_vertex(r, list[at][0], list[at][1], list[at][2]);
+        for (int c = 0; c < r->children; c++) {
+            const int *p = r->child[c];
+            const bool border = p[0] == 0 || p[1] == 0 || p[0] == last || p[1] == last;
+            if (++offers[at_of(r, p)] == (border ? 1 : 2)) OFFER(p[0], p[1], r->centre ? r->q : r->q / 2);
+        }
     }
-    for (int c = 0; c < 4; c++)
-        block->error[(c / 2 ? (n - 1) * n : 0) + (c % 2 ? n - 1 : 0)] = (rqt_code)unzigzag(NEXT());
-    assert_int_equal(next, count);
+    assert_int_equal(listed, h.kept);
+    assert_int_equal((bit + 7) / 8, payload + h.payload - bits);
+    for (size_t i = 0; i < listed; i++) {
+        const int at = list[i][1] * n + list[i][0];
+        int64_t sum = 0, of = 1;
+        if (i < 4) {
+            sum = i == 0 ? 0 : i == 3 ? block->q[last] : block->q[0];
+        } else {
+            reference_vertex(r, list[i][0], list[i][1], list[i][2]);
+            of = r->apexes == 2 ? 4 : 2;
+            for (int c = 0; c < (int)of; c++) sum += block->q[at_of(r, c < 2 ? r->end[c] : r->apex[c - 2])];
+        }
+        const int64_t mean = (sum - (sum % of + of) % of) / of;
+        block->q[at] = (int32_t)((uint32_t)mean + unzigzag(plane_value(payload, h.kept, h.height_planes, i)));
+        block->flags[at] = (uint8_t)(h.has_voids ? valid[i / 8] >> i % 8 & 1 : !h.all_void);
+        if (h.has_outline && i >= 4 && outline[(i - 4) / 8] >> (i - 4) % 8 & 1) block->flags[at] |= RQT_OUTLINE;
+    }
+    for (size_t i = listed; i-- > 4;) {
+        reference_vertex(r, list[i][0], list[i][1], list[i][2]);
+        reference_error(r, plane_value(errors_at, h.kept - 4, h.error_planes, i - 4));
+    }
+    free(list);
+    free(offers);
+}
+
+static void reference_decode(bytes b, rqt_block *block) {
+    rqt_block_header h;
+    assert_int_equal(rqt_block_info(b.data, b.size, &h, NULL), RQT_OK);
+    uint8_t *payload = take(h.payload);
+    assert_int_equal(ZSTD_decompress(payload, h.payload, b.data + HEADER_BYTES, b.size - HEADER_BYTES), h.payload);
+    reference r = {.h = h, .b = block, .n = side_of(h.k)};
+    (h.sparse ? reference_sparse : reference_whole)(&r, payload);
     block->width = h.width;
     block->height = h.height;
+    block->sparse = h.sparse;
+    block->floor = h.floor;
     free(payload);
 }
 
@@ -130,15 +283,22 @@ static void the_bytes_of_a_block_mean_what_the_format_says(void **state) {
         const int n = side_of(k);
         rqt_block block = new_block(k), back = new_block(k), ours = new_block(k);
         for (terrain what = FLAT; what < KINDS; what++)
-            for (int round = 0; round < 4; round++) {
-                fill(&block, round < 2 ? n : 1 + (int)random_below((uint32_t)n), round < 3 ? n : (n + 1) / 2, what,
-                     round ? 5 : 0, round % 2 ? LIKELY_ERRORS : ANY_ERRORS, 9);
-                bytes b = encode(codec, &block, quanta[round]);
+            for (int round = 0; round < 8; round++) {
+                fill(&block, round % 4 < 2 ? n : 1 + (int)random_below((uint32_t)n),
+                     round % 4 < 3 ? n : (n + 1) / 2, what, round ? 5 : 0, round % 2 ? LIKELY_ERRORS : ANY_ERRORS,
+                     round % 3 ? 9 : 0);
+                if (round > 3)
+                    make_sparse(&block, round % 2 ? 33100 : 20000);
+                else
+                    block.sparse = false, block.floor = 0;
+                bytes b = encode(codec, &block, quanta[round % 4]);
                 reference_decode(b, &back);
                 assert_same_block(&block, &back);
                 /* under the voids too */
                 assert_int_equal(rqt_block_decode(codec, b.data, b.size, &ours), RQT_OK);
                 assert_memory_equal(ours.q, back.q, count_of(k) * sizeof *ours.q);
+                assert_memory_equal(ours.error, back.error, count_of(k) * sizeof *ours.error);
+                assert_memory_equal(ours.flags, back.flags, count_of(k));
                 free(b.data);
             }
         rqt_block_free(&ours, &allocator);

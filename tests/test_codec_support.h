@@ -21,7 +21,7 @@
 
 #include "internal.h"
 
-enum { HEADER_BYTES = 32 };
+enum { HEADER_BYTES = 40 };
 
 typedef struct heap {
     size_t live, calls, refuse; /* refuse: the one request that is refused, counted from 1; 0: none */
@@ -169,6 +169,56 @@ static inline void fill(rqt_block *b, int width, int height, terrain what, uint3
         if (outline && random_below(outline) == 0) b->flags[at] |= RQT_OUTLINE;
 }
 
+/* The parents of a vertex within a block, by their places; corners are nobody's child here. */
+static inline int parents_of(int k, int at, int parents[2]) {
+    const int n = side_of(k), x = at % n, y = at / n, last = n - 1;
+    int count = 0, q = 1;
+    if (x % last == 0 && y % last == 0) return 0;
+    while (x % (2 * q) == 0 && y % (2 * q) == 0) q *= 2;
+    for (int c = 0; c < 4; c++) {
+        int px = x, py = y;
+        if (x % (2 * q) && y % (2 * q)) { /* a centre: the two corners of its cell that are sides themselves */
+            px += c & 1 ? q : -q;
+            py += c & 2 ? q : -q;
+            if ((px / (2 * q) + py / (2 * q)) % 2 == 0 || 2 * q == last) continue;
+        } else { /* a side: the centres beside it */
+            if (c > 1) continue;
+            *(x % (2 * q) ? &py : &px) += c ? q : -q;
+            if (px < 0 || py < 0 || px > last || py > last) continue;
+        }
+        parents[count++] = py * n + px;
+    }
+    return count;
+}
+
+static inline bool is_block_corner(int k, int at) {
+    const int n = side_of(k), last = n - 1;
+    return at % n % last == 0 && at / n % last == 0;
+}
+
+static inline bool is_kept(const rqt_block *b, int at) {
+    return !b->sparse || is_block_corner(b->k, at) || b->error[at] > b->floor || b->flags[at] & RQT_OUTLINE;
+}
+
+/* Errors and outline bits handed on to the parents, as those of a terrain are. */
+static inline void make_sparse(rqt_block *b, rqt_code floor) {
+    const int n = side_of(b->k);
+    for (int q = 1; q < n - 1; q *= 2)
+        for (int centre = 0; centre < 2; centre++)
+            for (int y = 0; y < n; y += q)
+                for (int x = 0; x < n; x += q) {
+                    if ((x / q % 2 + y / q % 2) != 1 + centre) continue;
+                    const int at = y * n + x;
+                    int parents[2];
+                    for (int c = parents_of(b->k, at, parents); c-- > 0;) {
+                        if (b->error[parents[c]] < b->error[at]) b->error[parents[c]] = b->error[at];
+                        b->flags[parents[c]] |= b->flags[at] & RQT_OUTLINE;
+                    }
+                }
+    b->sparse = true;
+    b->floor = floor;
+}
+
 typedef struct bytes {
     uint8_t *data;
     size_t size;
@@ -185,14 +235,19 @@ static inline bytes encode(rqt_codec *codec, const rqt_block *block, double quan
     return b;
 }
 
+/* b is what decoding made of a. */
 static inline void assert_same_block(const rqt_block *a, const rqt_block *b) {
     assert_int_equal(a->k, b->k);
     assert_int_equal(a->width, b->width);
     assert_int_equal(a->height, b->height);
-    for (size_t i = 0; i < count_of(a->k); i++) {
-        assert_int_equal(a->flags[i], b->flags[i]);
-        assert_int_equal(a->error[i], b->error[i]);
-        if (a->flags[i] & RQT_VALID) assert_int_equal(a->q[i], b->q[i]);
+    assert_int_equal(a->sparse, b->sparse);
+    assert_int_equal(a->floor, b->floor);
+    for (int i = 0; i < (int)count_of(a->k); i++) {
+        const bool kept = is_kept(a, i), corner = is_block_corner(a->k, i);
+        const uint8_t mask = corner ? RQT_VALID : 255;
+        assert_int_equal(b->flags[i], kept ? a->flags[i] & mask : RQT_VALID);
+        assert_int_equal(b->error[i], kept && !corner ? a->error[i] : 0);
+        if (!kept || a->flags[i] & RQT_VALID) assert_int_equal(b->q[i], kept ? a->q[i] : 0);
         assert_true(b->q[i] > -RQT_HEIGHT_LIMIT && b->q[i] < RQT_HEIGHT_LIMIT);
     }
 }

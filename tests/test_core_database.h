@@ -95,7 +95,9 @@ static inline const rqt_block *database_read(void *context, rqt_block_number num
         memset(d->scratch.q, 0x5A, vertices * sizeof *d->scratch.q);
         memset(d->scratch.error, 0x5A, vertices * sizeof *d->scratch.error);
         memset(d->scratch.flags, 0x5A, vertices);
-        return rqt_block_decode(d->codec, s->bytes, s->size, &d->scratch) == RQT_OK ? &d->scratch : NULL;
+        if (rqt_block_decode(d->codec, s->bytes, s->size, &d->scratch) != RQT_OK) return NULL;
+        rqt_block_set_corners(&d->scratch, &s->summary);
+        return &d->scratch;
     }
     fail_msg("block %llu was asked for and does not exist", (unsigned long long)number);
     return NULL;

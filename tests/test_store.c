@@ -57,8 +57,20 @@ static void error_too_large(rqt_block *b) {
 static void error_infinite(rqt_block *b) {
     b->error[FINE] = RQT_CODE_INFINITY;
 }
-static void error_of_root_corner(rqt_block *b) {
-    b->error[0] = RQT_CODE_LARGEST;
+static void vertex_dropped(rqt_block *b) {
+    assert_true(b->error[EAST] > b->floor);
+    b->error[EAST] = 0;
+    b->flags[EAST] = RQT_VALID;
+}
+static void floor_lower(rqt_block *b) {
+    b->floor--;
+}
+static void not_sparse(rqt_block *b) {
+    b->sparse = false;
+    b->floor = 0;
+}
+static void error_of_root_corner(rqt_summary *s) {
+    s->corner[0].error = RQT_CODE_LARGEST;
 }
 static void outline_of_parent(rqt_block *b) {
     b->flags[CENTER] ^= RQT_OUTLINE;
@@ -72,8 +84,8 @@ static void outline_unsaturated(rqt_block *b) {
 static void void_without_outline(rqt_block *b) {
     b->flags[FINE] = 0;
 }
-static void outline_of_root_corner(rqt_block *b) {
-    b->flags[4] ^= RQT_OUTLINE;
+static void outline_of_root_corner(rqt_summary *s) {
+    s->corner[1].flags ^= RQT_OUTLINE;
 }
 static void narrower(rqt_block *b) {
     b->width = 3;
@@ -147,7 +159,10 @@ static const damage damages[] = {
     BLOCK(268, error_too_large, 67, "has em "),
     BLOCK(268, error_too_large, 0, "has max_error "),
     BLOCK(268, error_infinite, 268, "infinite"),
-    BLOCK(1, error_of_root_corner, 1, "infinite"),
+    BLOCK(67, vertex_dropped, 269, "its parent, block 67, about the error at (16,10)"),
+    BLOCK(67, floor_lower, 67, "has the floor "),
+    BLOCK(67, not_sparse, 67, "does not fit its place: it keeps all vertices"),
+    SUMMARY(1, error_of_root_corner, 1, "infinite"),
     BLOCK(268, outline_of_parent, 268, "its parent, block 67, about the flags"),
     BLOCK(268, outline_of_east, 268, "its eastern neighbour, block 269, about the flags"),
     BLOCK(268, outline_unsaturated, 268, "a vertex with less error or outline than one that depends on it"),
@@ -168,8 +183,8 @@ static const damage damages[] = {
     SUMMARY(268, center_error, 268, "another centre"),
     SUMMARY(67, center_flags, 67, "another centre"),
     SUMMARY(268, corner_height, 268, "another north-east corner"),
-    SUMMARY(67, corner_error, 67, "another south-west corner"),
-    SUMMARY(67, corner_flags, 67, "another south-east corner"),
+    SUMMARY(67, corner_error, 67, "its southern neighbour, block 73, about the error"),
+    SUMMARY(67, corner_flags, 67, "its southern neighbour, block 73, about the flags"),
     SUMMARY(268, far_height, 268, "another far vertex 0 in its summary than the data of block 67"),
     SUMMARY(268, far_error, 268, "another far vertex 1"),
     SUMMARY(268, far_flags, 268, "another far vertex 1"),
@@ -267,7 +282,7 @@ static void an_outline_bit_that_is_lost_beside_a_void_is_found(void **state) {
     sqlite3_close(db);
 
     db = memory_terrain(40, 33, K, true); /* the root's centre has one, and its north-east corner must */
-    edit_block(db, 1, K, outline_of_root_corner, test_quantum);
+    edit_summary(db, 1, outline_of_root_corner);
     assert_int_equal(check_terrain(db, &f), SQLITE_OK);
     assert_true(has_finding(&f, 1, "less error or outline than one that depends on it: at (64,0)"));
     sqlite3_close(db);

@@ -30,3 +30,12 @@ void rqt_block_free(rqt_block *block, const rqt_allocator *allocator) {
     memory_drop(allocator, block->q);
     memset(block, 0, sizeof *block);
 }
+
+void rqt_block_set_corners(rqt_block *block, const rqt_summary *summary) {
+    const size_t n = ((size_t)1 << block->k) + 1, at[4] = {0, n - 1, (n - 1) * n, n * n - 1};
+    for (int c = 0; c < 4; c++) {
+        block->error[at[c]] = summary->corner[c].error;
+        block->flags[at[c]] =
+            (uint8_t)((block->flags[at[c]] & RQT_VALID) | (summary->corner[c].flags & RQT_OUTLINE));
+    }
+}

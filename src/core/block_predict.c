@@ -64,32 +64,13 @@ uint32_t restore_height_row(const uint32_t *residual, const int32_t *above, int3
 
 /* ---------------------------------------------------------------------------------------------- errors */
 
-/* The code nearest above a float >= 0: 8 significant bits are the top 16 of its bits, with another bias. */
-static inline rqt_code code_near_above(float v) {
-    uint32_t bits;
-    memcpy(&bits, &v, 4);
-    uint32_t code = ((bits + 0xFFFF) >> 16) + ((263 - 7 - 127) << 7);
-    return (rqt_code)(bits ? code : 0);
-}
-
-/* What z differs from the midpoint of two heights with this sum: |2z - sum| times half, as a code. */
-static inline rqt_code midpoint_code(int32_t z, uint32_t sum, float half) {
-    return code_near_above(fabsf((float)(int32_t)(2 * (uint32_t)z - sum)) * half);
-}
-
-static inline uint32_t sum_of(int32_t a, int32_t b) {
-    return (uint32_t)a + (uint32_t)b;
+float half_of(double quantum) {
+    double half = quantum * (0.5 - 0x1p-21);
+    return (float)(half < 0x1p-90 ? 0x1p-90 : half > 0x1p90 ? 0x1p90 : half);
 }
 
 static inline rqt_code larger(rqt_code a, rqt_code b) {
     return a > b ? a : b;
-}
-
-/* Half a quantum, less one part in 2^20: so that a product that is a code itself, and that rounding has lifted a
- * little, gives this code and not the next. Kept where no product overflows or denormalises. */
-static float half_of(double quantum) {
-    double half = quantum * (0.5 - 0x1p-21);
-    return (float)(half < 0x1p-90 ? 0x1p-90 : half > 0x1p90 ? 0x1p90 : half);
 }
 
 /* One row of codes or residuals, whichever is asked for. */
@@ -111,31 +92,125 @@ static inline void split(const int32_t *row, int n, int32_t *even, int32_t *odd)
 
 /* Raise the predictions of n sides of one row to their children's codes: two rows (NULL beyond the block) of 2n
  * centres of half the scale. The children of side i of an H row are the centres 2i and 2i+1. */
-static void raise_h(rqt_code *prediction, int n, const rqt_code *centres) {
+static inline void raise_h(rqt_code *prediction, int n, const rqt_code *centres) {
     if (!centres) return;
     for (int i = 0; i < n; i++) prediction[i] = larger(prediction[i], larger(centres[2 * i], centres[2 * i + 1]));
 }
 
 /* The same for the n + 1 sides of a V row: the children of side i are the centres 2i-1 and 2i. */
-static void raise_v(rqt_code *prediction, int n, const rqt_code *centres) {
+static inline void raise_v(rqt_code *prediction, int n, const rqt_code *centres) {
     prediction[0] = larger(prediction[0], centres[0]);
     for (int i = 1; i < n; i++) prediction[i] = larger(prediction[i], larger(centres[2 * i - 1], centres[2 * i]));
     prediction[n] = larger(prediction[n], centres[2 * n - 1]);
 }
 
-/* One scale. The grid of heights has 2n + 1 rows and columns (stride between rows), n > 0; centres are those of
- * half the scale, 2n rows of 2n, or NULL at the finest. code and residual: H, V, H, V .. H, then the rows of C.
- * Writes every second row and column of heights to next. */
-static void code_scale_of_errors(bool restoring, const int32_t *heights, int stride, int n, const rqt_code *centres,
-                                 float half, rqt_code *code, uint16_t *residual, int32_t *next) {
+/* At the second scale a diamond holds few enough samples to look at all of them, and so to know the error exactly
+ * where all of the diamond is in the block. Those on the legs are left to the children. In quarters of a quantum.
+ */
+static inline uint32_t size_of(uint32_t difference) {
+    return (int32_t)difference < 0 ? 0 - difference : difference;
+}
+static inline uint32_t wider(uint32_t a, uint32_t b) {
+    return a > b ? a : b;
+}
+
+/* A side at z, its hypotenuse `along`, its apexes `across`: at 2 steps each. */
+static inline int32_t deep_side(const int32_t *z, ptrdiff_t along, ptrdiff_t across, bool before, bool after) {
+    const uint32_t l = (uint32_t)z[-2 * along], r = (uint32_t)z[2 * along], ends = l + r;
+    uint32_t most = size_of(4 * (uint32_t)z[0] - 2 * ends);
+    most = wider(most, size_of(4 * (uint32_t)z[-along] - 2 * l - ends));
+    most = wider(most, size_of(4 * (uint32_t)z[along] - 2 * r - ends));
+    if (before) most = wider(most, size_of(4 * (uint32_t)z[-across] - 2 * (uint32_t)z[-2 * across] - ends));
+    if (after) most = wider(most, size_of(4 * (uint32_t)z[across] - 2 * (uint32_t)z[2 * across] - ends));
+    return (int32_t)most;
+}
+
+/* Half the diamond of a centre at z: apex at (2a, -2b), hypotenuse from (-2a, -2b) to (2a, 2b). */
+static inline uint32_t deep_half(const int32_t *z, ptrdiff_t a, ptrdiff_t b) {
+    const uint32_t e = (uint32_t)z[-2 * a - 2 * b], f = (uint32_t)z[2 * a + 2 * b], t = (uint32_t)z[2 * a - 2 * b];
+    const uint32_t all = e + f + t;
+    const uint32_t inner = size_of(4 * (uint32_t)z[a - b] - t - all);
+    return wider(inner, wider(size_of(4 * (uint32_t)z[-b] - e - all), size_of(4 * (uint32_t)z[a] - f - all)));
+}
+
+static inline int32_t deep_centre(const int32_t *z, ptrdiff_t a, ptrdiff_t b) {
+    const uint32_t e = (uint32_t)z[-2 * a - 2 * b], f = (uint32_t)z[2 * a + 2 * b], ends = e + f;
+    const uint32_t middle = size_of(4 * (uint32_t)z[0] - 2 * ends);
+    const uint32_t quarters =
+        wider(size_of(4 * (uint32_t)z[-a - b] - 2 * e - ends), size_of(4 * (uint32_t)z[a + b] - 2 * f - ends));
+    return (int32_t)wider(wider(middle, quarters), wider(deep_half(z, a, b), deep_half(z, -a, -b)));
+}
+
+static inline void deep_codes(const int32_t *t, int n, float quarter, rqt_code *p) {
+    for (int i = 0; i < n; i++) p[i] = code_near_above(fabsf((float)t[i]) * quarter);
+}
+
+/* n sides of an H row from z on, 4 apart; which of the rows of apexes are in the block does not change on the way.
+ */
+static inline void deep_h(const int32_t *z, ptrdiff_t side, int n, bool before, bool after, int32_t *t) {
+    if (before && after)
+        for (int i = 0; i < n; i++) t[i] = deep_side(z + 4 * i, 1, side, true, true);
+    else if (after)
+        for (int i = 0; i < n; i++) t[i] = deep_side(z + 4 * i, 1, side, false, true);
+    else
+        for (int i = 0; i < n; i++) t[i] = deep_side(z + 4 * i, 1, side, true, false);
+}
+
+static inline void deep_v(const int32_t *z, ptrdiff_t side, int n, int last, int32_t *t) {
+    if (n > 0) t[0] = deep_side(z, side, 1, false, true);
+    for (int i = 1; i < n && i < last; i++) t[i] = deep_side(z + 4 * i, side, 1, true, true);
+    if (n > last) t[last] = deep_side(z + 4 * last, side, 1, true, false);
+}
+
+static inline void deep_c(const int32_t *z, ptrdiff_t side, int n, int odd_row, int32_t *t) {
+    for (int i = odd_row; i < n; i += 2) t[i] = deep_centre(z + 4 * i, 1, side);
+    for (int i = 1 - odd_row; i < n; i += 2) t[i] = deep_centre(z + 4 * i, -1, side);
+}
+
+/* What the flags know: a vertex with the outline bit errs as much as outlines cost, and of other voids nothing is
+ * known. n vertices, `step` apart. */
+static inline void heed_flags(rqt_code *p, int n, const uint8_t *flags, ptrdiff_t step, rqt_code ground) {
+    for (int i = 0; i < n; i++) {
+        const int flag = flags[i * step];
+        p[i] = flag == RQT_VALID ? p[i] : flag & RQT_OUTLINE ? ground : 0;
+    }
+}
+
+/* How many of `most` positions first, first + 2q ... have a diamond that begins before the last sample. Behind it
+ * all of a diamond is one sample thick: it errs by nothing. */
+static inline int32_t within(int32_t samples, int32_t first, int32_t q, int32_t most) {
+    const int32_t room = samples - 1 - (first - q);
+    const int32_t fit = room <= 0 ? 0 : (room + 2 * q - 1) / (2 * q);
+    return fit < most ? fit : most;
+}
+
+/* One scale, q = 1 << scale. The grid of heights has 2n + 1 rows and columns (stride between rows), n > 0; centres
+ * are those of half the scale, 2n rows of 2n, or NULL at the finest. code and residual: H, V, H, V .. H, then the
+ * rows of C. Writes every second row and column of heights to next. */
+static inline void code_one_scale(bool restoring, const error_field *f, int scale, const int32_t *heights,
+                                  int stride, int n, const rqt_code *centres, rqt_code *code, uint16_t *residual,
+                                  int32_t *next) {
     enum { HALF_N = LARGEST_N / 2 + 1 };
-    int32_t even[HALF_N], odd[HALF_N];
+    int32_t even[HALF_N], odd[HALF_N], t[HALF_N];
     rqt_code p[HALF_N];
-    const ptrdiff_t pair = 2 * n + 1, first_centre = pair * n + n;
+    const ptrdiff_t pair = 2 * n + 1, first_centre = pair * n + n, side = (1 << f->k) + 1;
+    const int32_t q = 1 << scale;
+    const float half = half_of(f->quantum);
+    const rqt_code ground = f->ground ? ground_at(f->ground, scale) : 0;
+    const int32_t fit_h = within(f->width, q, q, n), fit_v = within(f->width, 0, q, n + 1);
     for (int j = 0; j <= n; j++) {
+        const ptrdiff_t row = (ptrdiff_t)2 * j * q * side;
+        const int32_t m = within(f->height, 2 * j * q, q, 1) ? fit_h : 0;
         int32_t *e = next + (ptrdiff_t)j * (n + 1);
         split(heights + (ptrdiff_t)2 * j * stride, n, e, odd);
-        for (int i = 0; i < n; i++) p[i] = midpoint_code(odd[i], sum_of(e[i], e[i + 1]), half);
+        if (scale == 1) {
+            deep_h(f->q + row + q, side, m, j > 0, j < n, t);
+            deep_codes(t, m, half * 0.5f, p);
+        } else {
+            for (int i = 0; i < m; i++) p[i] = midpoint_code(odd[i], sum_of(e[i], e[i + 1]), half);
+        }
+        for (int i = m; i < n; i++) p[i] = 0;
+        if (f->flags) heed_flags(p, n, f->flags + row + q, 2 * q, ground);
         if (centres) {
             raise_h(p, n, j > 0 ? centres + (ptrdiff_t)(2 * j - 1) * 2 * n : NULL);
             raise_h(p, n, j < n ? centres + (ptrdiff_t)(2 * j) * 2 * n : NULL);
@@ -143,10 +218,20 @@ static void code_scale_of_errors(bool restoring, const int32_t *heights, int str
         settle(restoring, p, n, code + j * pair, residual + j * pair);
     }
     for (int j = 0; j < n; j++) {
+        const ptrdiff_t row = (ptrdiff_t)(2 * j + 1) * q * side;
+        const bool fits = within(f->height, (2 * j + 1) * q, q, 1);
+        const int32_t m_v = fits ? fit_v : 0, m_c = !fits || n == 1 ? 0 : fit_h;
         const int32_t *above = next + (ptrdiff_t)j * (n + 1), *below = above + n + 1;
         rqt_code *h = code + j * pair, *v = h + n, *c = code + first_centre + (ptrdiff_t)j * n;
         split(heights + (ptrdiff_t)(2 * j + 1) * stride, n, even, odd);
-        for (int i = 0; i <= n; i++) p[i] = midpoint_code(even[i], sum_of(above[i], below[i]), half);
+        if (scale == 1) {
+            deep_v(f->q + row, side, m_v, n, t);
+            deep_codes(t, m_v, half * 0.5f, p);
+        } else {
+            for (int i = 0; i < m_v; i++) p[i] = midpoint_code(even[i], sum_of(above[i], below[i]), half);
+        }
+        for (int i = m_v; i <= n; i++) p[i] = 0;
+        if (f->flags) heed_flags(p, n + 1, f->flags + row, 2 * q, ground);
         if (centres) {
             raise_v(p, n, centres + (ptrdiff_t)(2 * j) * 2 * n);
             raise_v(p, n, centres + (ptrdiff_t)(2 * j + 1) * 2 * n);
@@ -154,33 +239,34 @@ static void code_scale_of_errors(bool restoring, const int32_t *heights, int str
         settle(restoring, p, n + 1, v, residual + j * pair + n);
         /* The diagonal goes from above left where i and j are both even or both odd. The block's only centre has
          * the diagonal of its place in the lattice, which is not known here: it makes do with its children. */
-        if (n == 1) {
-            p[0] = 0;
+        if (scale == 1) {
+            deep_c(f->q + row + q, side, m_c, j & 1, t);
+            deep_codes(t, m_c, half * 0.5f, p);
         } else {
-            for (int i = 0; i < n; i++) {
+            for (int i = 0; i < m_c; i++) {
                 const uint32_t other = 0 - (uint32_t)((i ^ j) & 1); /* a mask: a branch would be slower */
                 const uint32_t sum =
                     (sum_of(above[i], below[i + 1]) & ~other) | (sum_of(above[i + 1], below[i]) & other);
                 p[i] = midpoint_code(odd[i], sum, half);
             }
         }
+        for (int i = m_c; i < n; i++) p[i] = 0;
+        if (f->flags) heed_flags(p, n, f->flags + row + q, 2 * q, ground);
         const rqt_code *h_below = h + pair;
         for (int i = 0; i < n; i++) p[i] = larger(p[i], larger(larger(h[i], h_below[i]), larger(v[i], v[i + 1])));
         settle(restoring, p, n, c, residual + (c - code));
     }
 }
 
-static void code_errors(bool restoring, error_scratch *s, int k, const int32_t *q, double quantum) {
-    const float half = half_of(quantum);
-    const rqt_code corner_prediction[4] = {0};
-    const int32_t *heights = q;
+static inline void code_errors(bool restoring, error_scratch *s, const error_field *f) {
+    const int32_t *heights = f->q;
     const rqt_code *centres = NULL;
     rqt_code *code = s->code;
     uint16_t *residual = s->residual;
-    int stride = (1 << k) + 1;
-    for (int n = 1 << k >> 1, scale = 0; n > 0; n >>= 1, scale++) {
+    int stride = (1 << f->k) + 1;
+    for (int n = 1 << f->k >> 1, scale = 0; n > 0; n >>= 1, scale++) {
         int32_t *next = s->heights[scale & 1];
-        code_scale_of_errors(restoring, heights, stride, n, centres, half, code, residual, next);
+        code_one_scale(restoring, f, scale, heights, stride, n, centres, code, residual, next);
         ptrdiff_t coded = (ptrdiff_t)n * (3 * n + 2);
         centres = code + (coded - (ptrdiff_t)n * n);
         code += coded;
@@ -188,11 +274,11 @@ static void code_errors(bool restoring, error_scratch *s, int k, const int32_t *
         heights = next;
         stride = n + 1;
     }
-    settle(restoring, corner_prediction, 4, code, residual);
 }
 
 /* From rows to coding order, finest scale first. */
-void predict_errors(error_scratch *s, int k, const int32_t *q, double quantum, const rqt_code *error) {
+void predict_errors(error_scratch *s, const error_field *f, const rqt_code *error) {
+    const int k = f->k;
     const rqt_code *grid = error;
     rqt_code *code = s->code;
     for (int n = 1 << k >> 1, scale = 0; n > 0; n >>= 1, scale++) {
@@ -215,8 +301,7 @@ void predict_errors(error_scratch *s, int k, const int32_t *q, double quantum, c
         code = c;
         grid = s->grid[scale & 1];
     }
-    memcpy(code, grid, 4 * sizeof *code);
-    code_errors(false, s, k, q, quantum);
+    code_errors(false, s, f);
 }
 
 static void merge(rqt_code *row, int n, const rqt_code *even, const rqt_code *odd) {
@@ -228,11 +313,12 @@ static void merge(rqt_code *row, int n, const rqt_code *even, const rqt_code *od
 }
 
 /* And back: from coding order to rows, coarsest scale first. */
-void restore_errors(error_scratch *s, int k, const int32_t *q, double quantum, rqt_code *error) {
-    code_errors(true, s, k, q, quantum);
-    const int side = (1 << k) + 1;
-    const rqt_code *end = s->code + (ptrdiff_t)side * side - 4, *coarse = end;
-    if (k == 0) memcpy(error, end, 4 * sizeof *error);
+void restore_errors(error_scratch *s, const error_field *f, rqt_code *error) {
+    code_errors(true, s, f);
+    const int k = f->k, side = (1 << k) + 1;
+    static const rqt_code corners[4] = {0};
+    const rqt_code *end = s->code + (ptrdiff_t)side * side - 4, *coarse = corners;
+    if (k == 0) memcpy(error, corners, sizeof corners);
     for (int n = 1; n < side - 1; n *= 2) {
         rqt_code *grid = 2 * n == side - 1 ? error : s->grid[coarse == s->grid[0]];
         const ptrdiff_t pair = 2 * n + 1;

@@ -4,6 +4,8 @@
 
 #include "internal.h"
 
+#include <math.h>
+
 enum {
     LARGEST_N = (1 << RQT_MAX_BLOCK_K) + 1,
     LARGEST_COUNT = LARGEST_N * LARGEST_N,
@@ -28,6 +30,36 @@ void predict_height_row(const int32_t *row, const int32_t *above, int32_t width,
 /* The row from its residuals. Returns a number with its top bit set when a height is beyond RQT_HEIGHT_LIMIT. */
 uint32_t restore_height_row(const uint32_t *residual, const int32_t *above, int32_t width, int32_t *row);
 
+/* The code nearest above a float >= 0: 8 significant bits are the top 16 of its bits, with another bias. */
+static inline rqt_code code_near_above(float v) {
+    uint32_t bits;
+    memcpy(&bits, &v, 4);
+    uint32_t code = ((bits + 0xFFFF) >> 16) + ((263 - 7 - 127) << 7);
+    return (rqt_code)(bits ? code : 0);
+}
+
+/* What z differs from the midpoint of two heights with this sum: |2z - sum| times half, as a code. */
+static inline rqt_code midpoint_code(int32_t z, uint32_t sum, float half) {
+    return code_near_above(fabsf((float)(int32_t)(2 * (uint32_t)z - sum)) * half);
+}
+
+static inline uint32_t sum_of(int32_t a, int32_t b) {
+    return (uint32_t)a + (uint32_t)b;
+}
+
+/* Half a quantum, less one part in 2^20: so that a product that is a code itself, and that rounding has lifted a
+ * little, gives this code and not the next. Kept where no product overflows or denormalises. */
+float half_of(double quantum);
+
+/* What an outline costs at a scale, by what it costs at the finest: a triangle twice as wide costs twice as much.
+ */
+static inline rqt_code ground_at(rqt_code ground, int scale) {
+    const uint32_t code = ground + 128u * (uint32_t)scale;
+    return (rqt_code)(code < RQT_CODE_INFINITY ? code : RQT_CODE_INFINITY);
+}
+
+/* ------------------------------------------------------------------------------ blocks that keep all vertices */
+
 /* Room for a pass over the errors of the largest block. code and residual are in coding order: FORMAT.md. */
 typedef struct error_scratch {
     rqt_code code[LARGEST_COUNT];
@@ -36,9 +68,73 @@ typedef struct error_scratch {
     rqt_code grid[2][LARGEST_COUNT / 3];
 } error_scratch;
 
-/* error (row by row) -> scratch->residual. q: the heights as the decoder will know them. */
-void predict_errors(error_scratch *scratch, int k, const int32_t *q, double quantum, const rqt_code *error);
-/* scratch->residual -> error */
-void restore_errors(error_scratch *scratch, int k, const int32_t *q, double quantum, rqt_code *error);
+/* What errors are predicted from. */
+typedef struct error_field {
+    int k;
+    int32_t width, height; /* stored heights */
+    const int32_t *q;      /* all heights, as the decoder will know them */
+    const uint8_t *flags;  /* NULL: all valid, and no outline */
+    rqt_code ground;       /* what an outline vertex of the finest scale errs; 0: not known */
+    double quantum;
+} error_field;
+
+/* error (row by row; the corners do not count) -> scratch->residual. */
+void predict_errors(error_scratch *scratch, const error_field *field, const rqt_code *error);
+/* scratch->residual -> error, that of the corners 0. */
+void restore_errors(error_scratch *scratch, const error_field *field, rqt_code *error);
+
+/* ------------------------------------------------------------------------------------- outline bits:
+ * block_outline.c
+ */
+
+enum { ROW_WORDS = (LARGEST_N + 63) / 64 };
+typedef struct bit_grid {
+    uint64_t row[LARGEST_N][ROW_WORDS];
+} bit_grid;
+typedef struct outline_scratch {
+    bit_grid valid, outline, residual;
+} outline_scratch;
+
+/* Outline bits of flags -> n*n residual bits, row by row; the corners do not count. False: there are none. */
+bool predict_outline(outline_scratch *scratch, int k, int32_t width, int32_t height, const uint8_t *flags,
+                     uint8_t *bits);
+/* And back, into flags that have their validity and nothing else. bits is followed by 16 bytes that may be read.
+ * False: no bit comes out, or a corner has one. */
+bool restore_outline(outline_scratch *scratch, int k, int32_t width, int32_t height, const uint8_t *bits,
+                     uint8_t *flags);
+
+/* ------------------------------------------------------------------------------- sparse blocks: block_sparse.c */
+
+enum { KEPT_CORNERS = 4 };
+
+/* The kept vertices of a block, the corners first, then from coarse to fine. */
+typedef struct kept_list {
+    int32_t place[LARGEST_COUNT + 1]; /* y * n + x */
+    size_t count;
+    int scales;                     /* of these, coarsest first: */
+    size_t end[RQT_MAX_BLOCK_K][2]; /* where its centres end, where its sides end */
+    size_t offered;                 /* bits */
+    uint8_t bits[LARGEST_COUNT / 8 + 1];
+    uint8_t kept[LARGEST_COUNT], seen[LARGEST_COUNT];
+} kept_list;
+
+/* From a block. False: what it keeps is not closed. */
+bool kept_list_make(kept_list *list, const rqt_block *block);
+/* From bits. False: not so many. */
+bool kept_list_read(kept_list *list, int k, const uint8_t *bits, size_t bytes);
+
+/* q -> count residuals. A void gets the height that is expected of it. */
+void predict_kept_heights(const kept_list *list, int k, const uint8_t *flags, int32_t *q, uint32_t *residual);
+/* The kept places of q. Returns a number with its top bit set when a height is beyond RQT_HEIGHT_LIMIT. */
+uint32_t restore_kept_heights(const kept_list *list, int k, const uint32_t *residual, int32_t *q);
+
+/* The least error of an outline vertex of the finest scale; 0: there is none. */
+rqt_code kept_ground(const kept_list *list, const rqt_block *block);
+/* block->error -> count - KEPT_CORNERS residuals. scratch: n*n. */
+void predict_kept_errors(const kept_list *list, const rqt_block *block, const int32_t *q, double quantum,
+                         rqt_code ground, rqt_code *scratch, uint16_t *residual);
+/* Into block->error, which is 0 throughout. False: a vertex is kept without reason. */
+bool restore_kept_errors(const kept_list *list, const rqt_block *block, double quantum, rqt_code ground,
+                         const uint16_t *residual);
 
 #endif

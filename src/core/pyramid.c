@@ -183,6 +183,8 @@ void rqt_pyramid_block(const rqt_pyramid *p, size_t n, rqt_block_number *number,
     block->k = p->k;
     block->width = place.width;
     block->height = place.height;
+    block->sparse = place.stride > 1;
+    block->floor = block->sparse ? b->em : 0;
     for (int32_t v = 0; v < side; v++) {
         for (int32_t u = 0; u < side; u++) {
             const rqt_vertex at = {place.x + u * place.stride, place.y + v * place.stride};

@@ -299,7 +299,8 @@ typedef struct rqt_block {
     uint8_t *flags;  /* RQT_VALID | RQT_OUTLINE */
     /* A block of stride > 1 is *sparse*: it answers only where eps >= floor (its em for the outline `tol`), so a
      * vertex with error <= floor and without outline bit, other than a corner, is never selected in it. Such a
-     * vertex is not kept: its q and error are not stored. */
+     * vertex is not kept: nothing of it is stored. Decoded it has q 0, error 0 and the flag RQT_VALID; encoding
+     * does not look at it. */
     bool sparse;
     rqt_code floor; /* 0 unless sparse */
 } rqt_block;
@@ -320,16 +321,20 @@ size_t rqt_block_bound(int k);
  * errors from heights. bytes has room for rqt_block_bound(block->k). Equal blocks give equal bytes. */
 rqt_status rqt_block_encode(rqt_codec *codec, const rqt_block *block, double quantum, uint8_t *bytes, size_t *size);
 /* bytes -> block, which was created with the k that rqt_block_info tells. Trusts nothing: any input gives
- * RQT_OK or RQT_CORRUPT, without reading past size. */
+ * RQT_OK or RQT_CORRUPT, without reading past size. The errors and outline bits of the four corners are not in the
+ * bytes but in the block's summary: here they are 0, until rqt_block_set_corners. */
 rqt_status rqt_block_decode(rqt_codec *codec, const uint8_t *bytes, size_t size, rqt_block *block);
 
 typedef struct rqt_block_header {
     int version, k;
     int32_t width, height; /* stored heights */
-    bool has_voids, all_void, has_outline;
-    int height_planes, error_planes; /* bytes per residual */
+    bool has_voids, all_void, has_outline, sparse;
+    int height_planes, finest_planes,
+        error_planes; /* bytes per residual: heights, errors of the finest scale, others */
     double quantum;
-    size_t payload; /* bytes after decompression */
+    rqt_code floor, ground; /* ground: what an outline vertex of the finest scale is expected to err */
+    size_t kept;            /* vertices of a sparse block, corners included; else 0 */
+    size_t payload;         /* bytes after decompression */
 } rqt_block_header;
 
 /* Header only, checked against size; the checksum is not computed. */
@@ -361,6 +366,9 @@ typedef struct rqt_summary {
     rqt_summary_vertex corner[4];
     rqt_summary_vertex far[2];
 } rqt_summary;
+
+/* What a decoded block lacks: the errors and outline bits of its corners. */
+void rqt_block_set_corners(rqt_block *block, const rqt_summary *summary);
 
 #define RQT_SUMMARY_BYTES 80
 void rqt_summary_encode(const rqt_summary *summary, uint8_t bytes[RQT_SUMMARY_BYTES]);

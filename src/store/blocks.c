@@ -11,7 +11,8 @@ int store_block_bytes(store *s, const store_terrain *t, rqt_block_number number,
     *size = 0;
     if (!*kept) {
         const int code = store_prepare(
-            s, t, kept, sqlite3_mprintf("SELECT data FROM \"%w\".rqt_block_%lld WHERE id = ?1", t->schema, t->id),
+            s, t, kept,
+            sqlite3_mprintf("SELECT data, summary FROM \"%w\".rqt_block_%lld WHERE id = ?1", t->schema, t->id),
             error);
         if (code != SQLITE_OK) return code;
     }
@@ -29,6 +30,16 @@ int store_block_bytes(store *s, const store_terrain *t, rqt_block_number number,
     }
     sqlite3_reset(*kept);
     return store_fail(error, SQLITE_CORRUPT_VTAB, "terrain %s is damaged: block %llu is missing", t->name, number);
+}
+
+/* What the block at hand in the statement lacks, out of its summary. */
+static rqt_status set_corners(sqlite3_stmt *row, rqt_block *block) {
+    rqt_summary summary;
+    const void *bytes = sqlite3_column_blob(row, 1);
+    const rqt_status status =
+        bytes ? rqt_summary_decode(bytes, (size_t)sqlite3_column_bytes(row, 1), &summary) : RQT_CORRUPT;
+    if (status == RQT_OK) rqt_block_set_corners(block, &summary);
+    return status;
 }
 
 int store_get_block(store *s, const store_terrain *t, rqt_block_number number, const rqt_block **block, int *read,
@@ -60,6 +71,9 @@ int store_get_block(store *s, const store_terrain *t, rqt_block_number number, c
         else if (status != RQT_OK)
             code = store_fail(error, SQLITE_CORRUPT_VTAB,
                               "terrain %s is damaged: block %llu: its bytes do not decode", t->name, number);
+        else if (set_corners(store_statements(s, t)->bytes, fresh) != RQT_OK)
+            code = store_fail(error, SQLITE_CORRUPT_VTAB, "terrain %s is damaged: the summary of block %llu",
+                              t->name, number);
         if (code != SQLITE_OK && fresh) block_cache_forget(s->cache, key, number);
     }
     sqlite3_reset(store_statements(s, t)->bytes);

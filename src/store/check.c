@@ -6,6 +6,9 @@
  * must be. Two scans of ids find rows that no cell demands, and sums over the walk are held against the terrain's
  * row. Memory: one block per level and the cache, whatever the terrain's size.
  *
+ * A block of stride > 1 holds its kept vertices only, and its corners' errors come from its summary. Where two
+ * blocks share a vertex that one of them does not keep, the other's must be one that may be dropped there.
+ *
  * A finding is told once, where it is: what cannot be read is not compared, and em is recomputed from the grids
  * below, never from what the children's summaries claim. A read transaction is held throughout, so a writer beside
  * us causes no findings.
@@ -130,6 +133,13 @@ typedef struct run {
     int32_t u, v, du, dv;
 } run;
 
+/* A vertex of which the block holds everything. */
+static bool is_kept(const rqt_block *b, size_t i) {
+    const size_t n = ((size_t)1 << b->k) + 1, last = n - 1;
+    return !b->sparse || b->error[i] > b->floor || b->flags[i] & RQT_OUTLINE ||
+           (i % n % last == 0 && i / n % last == 0);
+}
+
 /* n vertices of the frame's block (run a) beside those of another. Heights count where there are any. */
 static void compare(const frame *f, run a, run b, int32_t n, difference *d) {
     const int32_t side = (1 << f->block.k) + 1;
@@ -137,6 +147,14 @@ static void compare(const frame *f, run a, run b, int32_t n, difference *d) {
         const int32_t u = a.u + i * a.du, v = a.v + i * a.dv;
         const size_t p = (size_t)(v * side + u), q = (size_t)((b.v + i * b.dv) * side + b.u + i * b.du);
         const rqt_vertex at = {f->place.x + u * f->place.stride, f->place.y + v * f->place.stride};
+        const bool kept = is_kept(a.block, p), kept_there = is_kept(b.block, q);
+        if (!kept || !kept_there) {
+            const rqt_code floor = kept ? b.block->floor : a.block->floor;
+            const rqt_code error = kept ? a.block->error[p] : b.block->error[q];
+            if ((kept || kept_there) && error > floor) count(&d->errors, at);
+            if ((kept ? a.block->flags[p] : b.block->flags[q]) & RQT_OUTLINE) count(&d->flags, at);
+            continue;
+        }
         if (a.block->flags[p] != b.block->flags[q]) count(&d->flags, at);
         if (a.block->error[p] != b.block->error[q]) count(&d->errors, at);
         if ((a.block->flags[p] & b.block->flags[q] & RQT_VALID) && a.block->q[p] != b.block->q[q])
@@ -146,9 +164,10 @@ static void compare(const frame *f, run a, run b, int32_t n, difference *d) {
 
 /* --------------------------------------------------------------------------------------------- reading blocks */
 
-/* Decode a block's bytes into the cache; NULL when they are not that block's. say: and tell why. */
-static const rqt_block *decode(check *c, rqt_block_number number, const rqt_block_place *place, const void *bytes,
-                               size_t size, bool say) {
+/* Decode a block's bytes into the cache, with its corners from its summary; NULL when they are not that block's.
+ * say: and tell why. */
+static const rqt_block *decode(check *c, rqt_block_number number, const rqt_block_place *place,
+                               const rqt_summary *summary, const void *bytes, size_t size, bool say) {
     rqt_block_header header;
     rqt_message why = {""};
     if (rqt_block_info(bytes, size, &header, &why) != RQT_OK) {
@@ -161,12 +180,21 @@ static const rqt_block *decode(check *c, rqt_block_number number, const rqt_bloc
                   header.width, header.height, c->t->k, place->width, place->height);
         return NULL;
     }
+    if (header.sparse != (place->stride > 1)) {
+        if (say)
+            FOUND(c, number, "does not fit its place: it keeps %s",
+                  header.sparse ? "some vertices" : "all vertices");
+        return NULL;
+    }
+    if (say && header.sparse && header.floor != summary->tol.em)
+        FOUND(c, number, "has the floor %d, and em %d in its summary", header.floor, summary->tol.em);
     if (say && header.quantum != c->quantum)
         FOUND(c, number, "has the height quantum %.17g, the terrain has %.17g", header.quantum, c->quantum);
     const rqt_block *block = block_cache_find(c->cache, 0, number);
     if (block) return block;
     rqt_block *fresh = block_cache_add(c->cache, 0, number, c->t->k);
     const rqt_status status = fresh ? rqt_block_decode(c->codec, bytes, size, fresh) : RQT_NO_MEMORY;
+    if (status == RQT_OK) rqt_block_set_corners(fresh, summary);
     if (status == RQT_OK) return fresh;
     if (fresh) block_cache_forget(c->cache, 0, number);
     if (status == RQT_NO_MEMORY) {
@@ -207,12 +235,15 @@ static void read_frame(check *c, frame *f) {
         f->has_summary = bytes && rqt_summary_decode(bytes, size, &f->summary) == RQT_OK;
         if (!f->has_summary) FOUND(c, f->number, "has a damaged summary: its %d bytes do not decode", (int)size);
         bytes = column_bytes(c, 1, &size);
-        const rqt_block *block = ended(c) ? NULL : decode(c, f->number, &f->place, bytes, size, true);
+        const rqt_block *block =
+            ended(c) || !f->has_summary ? NULL : decode(c, f->number, &f->place, &f->summary, bytes, size, true);
         if (block) {
             const size_t side = ((size_t)1 << block->k) + 1;
             memcpy(f->block.q, block->q, side * side * sizeof *block->q);
             memcpy(f->block.error, block->error, side * side * sizeof *block->error);
             memcpy(f->block.flags, block->flags, side * side);
+            f->block.sparse = block->sparse;
+            f->block.floor = block->floor;
             f->has_block = true;
         }
     }
@@ -226,8 +257,11 @@ static const rqt_block *read_neighbour(check *c, rqt_block_number number, const 
     if (block || ended(c)) return block;
     if (step_to(c, c->row, number, false)) {
         size_t size;
-        const void *bytes = column_bytes(c, 1, &size);
-        if (!ended(c)) block = decode(c, number, place, bytes, size, false);
+        rqt_summary summary;
+        const void *bytes = column_bytes(c, 0, &size);
+        const bool readable = bytes && rqt_summary_decode(bytes, size, &summary) == RQT_OK;
+        bytes = column_bytes(c, 1, &size);
+        if (!ended(c) && readable) block = decode(c, number, place, &summary, bytes, size, false);
     }
     sqlite3_reset(c->row);
     return block;
@@ -292,6 +326,7 @@ static void check_inside(check *c, frame *f) {
             const rqt_vertex at = {f->place.x + u * f->place.stride, f->place.y + v * f->place.stride};
             const size_t i = (size_t)(v * n + u);
             const rqt_code error = f->block.error[i];
+            if (!is_kept(&f->block, i)) continue;
             const bool root_corner = is_root_corner(lattice, at);
             if ((error == RQT_CODE_INFINITY) != root_corner) count(&found.infinite, at);
             if (!is_sample(lattice, at) && (error || f->block.flags[i] & RQT_OUTLINE) && !has_area(lattice, at))
@@ -353,7 +388,9 @@ static void check_summary(check *c, const frame *f, const frame *parent) {
         const size_t center = (size_t)(half * (last + 1) + half);
         const rqt_code error = c->t->k > 0 ? f->block.error[center] : 0;
         const uint8_t flags = c->t->k > 0 ? f->block.flags[center] : 0;
-        if (s->center_error != error || s->center_flags != flags)
+        if (c->t->k > 0 && !is_kept(&f->block, center)
+                ? s->center_error > f->block.floor || s->center_flags & RQT_OUTLINE
+                : s->center_error != error || s->center_flags != flags)
             FOUND(c, f->number, "has another centre in its summary than in its data");
     }
     /* The far vertices are the parent's corners beside the one that the block shares with it. */
