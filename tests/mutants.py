@@ -120,6 +120,13 @@ MUTANTS = [
      "test_import_faults", "sources_of_unlike_grids_are_refused"),
     ("import: heights far from zero", "src/import/quantise.c", "(int64_t)middle", "(int64_t)0",
      "test_import", "heights_far_from_zero_lose_nothing"),
+    ("import: voids of the first band everywhere", "src/import/stream.c",
+     "if (w->valid) memcpy(w->valid + to, w->strip->valid + at, width);",
+     "if (w->valid) memcpy(w->valid + to, w->strip->valid + (size_t)y * width, width);",
+     "test_import_stream", "every_way_gives_the_same_tables_with_voids"),
+    ("import: decimals tried from zero only", "src/import/quantise.c", "if (z0 == t->steps.z0) return true;",
+     "if (z0 == t->steps.z0 || z0 > 0) return true;",
+     "test_import_stream", "every_way_gives_the_same_tables_of_decimals"),
 ]
 
 
