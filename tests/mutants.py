@@ -157,6 +157,13 @@ MUTANTS = [
     ("wire: heights beyond the limit", "src/core/wire_decode.c",
      "if (q > -RQT_HEIGHT_LIMIT && q < RQT_HEIGHT_LIMIT)", "if (q != INT64_MIN)",
      "test_wire", "hostile_bytes_are_refused_or_harmless"),
+    ("import: voids of the first band everywhere", "src/import/stream.c",
+     "if (w->valid) memcpy(w->valid + to, w->strip->valid + at, width);",
+     "if (w->valid) memcpy(w->valid + to, w->strip->valid + (size_t)y * width, width);",
+     "test_import_stream", "every_way_gives_the_same_tables_with_voids"),
+    ("import: decimals tried from zero only", "src/import/quantise.c", "if (z0 == t->steps.z0) return true;",
+     "if (z0 == t->steps.z0 || z0 > 0) return true;",
+     "test_import_stream", "every_way_gives_the_same_tables_of_decimals"),
 ]
 
 

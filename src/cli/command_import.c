@@ -28,9 +28,9 @@ static const char HELP[] =
     "                  the database, and takes about 12 bytes of memory a sample, 512 MiB at most\n"
     "  --block K       blocks of 2^K + 1 samples a side, K 1 to 8 (default %d)\n"
     "  --jobs J        threads (default: one for each processor)\n"
-    "  --memory MiB    memory that the import may take (default: half of the machine's, at most 4096); it takes\n"
-    "                  about 90 MiB, 5 for each thread, and 8 bytes a sample (130 MiB and 9 bytes where\n"
-    "                  heights are 64-bit numbers or in mixed units)\n"
+    "  --memory MiB    memory that the import may take, all told (default: half of the machine's, at most 4096).\n"
+    "                  Rasters that fit (about 5 bytes a sample, 9 where heights are 64-bit numbers or in mixed\n"
+    "                  units) are read once, larger ones twice; the terrain is the same\n"
     "  --help          this text\n"
     "\n"
     "Examples:\n"
@@ -141,8 +141,9 @@ static void print_report(const import_report *r, double seconds) {
         puts("none void");
     printf("  %s block%s, %s bytes, %.2f bits per sample\n", cli_count(r->blocks), r->blocks == 1 ? "" : "s",
            cli_count(r->bytes), 8.0 * (double)r->bytes / samples);
-    printf("  %.2f s (reading %.2f, errors %.2f, blocks %.2f), %.1f Msamples/s\n", seconds, r->seconds_read,
-           r->seconds_errors, r->seconds_blocks, samples / (seconds > 1e-9 ? seconds : 1e-9) / 1e6);
+    printf("  %.2f s (reading %.2f, errors and blocks %.2f, writing %.2f), %.1f Msamples/s\n", seconds,
+           r->seconds_read, r->seconds_errors, r->seconds_blocks,
+           samples / (seconds > 1e-9 ? seconds : 1e-9) / 1e6);
     if (r->overlap)
         printf("  %s samples in more than one source, %s of them differ\n", cli_count(r->overlap),
                cli_count(r->overlap_differs));

@@ -131,14 +131,14 @@ static int page_bytes(int k) {
     return k == 7 ? 4096 : 16384;
 }
 
-bool import_database_begin(const import_job *job, int k, import_database *d) {
+bool import_database_begin(const import_job *job, int k, int64_t page_cache, import_database *d) {
     struct stat file;
     bool there = stat(job->database, &file) == 0;
     *d = (import_database){.created = !there};
     if (!open_file(job, d, true)) return false;
     char sql[200];
-    snprintf(sql, sizeof sql, "PRAGMA cache_size = -%d; PRAGMA synchronous = NORMAL",
-             IMPORT_PAGE_CACHE_BYTES / 1024);
+    snprintf(sql, sizeof sql, "PRAGMA cache_size = -%lld; PRAGMA synchronous = NORMAL",
+             (long long)(page_cache / 1024));
     if (!run(job, d, sql)) return false;
     if (!there || file.st_size == 0) {
         char page_size[40];

@@ -1,4 +1,4 @@
-/* import.c - the whole: options, sources, probe, samples, heights, errors, blocks.
+/* import.c - the whole: options, sources, plan, probe, a first reading, errors and blocks, the database.
  *
  * The order is chosen by price: what can be refused without samples is refused before one is read, and the database
  * is only locked, and only created, when everything that goes into it is there.
@@ -15,9 +15,7 @@
 #include <time.h>
 #include <unistd.h>
 
-#define GDAL_CACHE_BYTES ((GIntBig)64 << 20)
 #define MIB 1048576.0
-#define PROCESS_BYTES (58 * MIB) /* measured: code, GDAL with its drivers, PROJ, SQLite */
 
 /* ------------------------------------------------------------------------------ what the parts call back -- */
 bool import_refuse(const import_job *job, const char *format, ...) {
@@ -121,16 +119,20 @@ static void name_of(const import_options *o, const import_source *first, char na
 /* ------------------------------------------------------------------------------------------------ the whole -- */
 typedef struct import_work {
     import_job job;
+    const import_force *force; /* for tests; NULL */
     import_source *sources;
     int count, described;
     import_mosaic mosaic;
     import_crs crs;
     int k;
-    import_samples samples;
+    import_plan plan;
+    import_pool *pool;
+    import_strip all; /* all values, when they are kept */
+    import_reader *reader;
+    import_coarse coarse;
     import_heights heights;
-    rqt_grid grid;
     rqt_void_cost cost;
-    rqt_errors errors;
+    import_stream stream;
     import_database database;
     import_report *report;
 } import_work;
@@ -145,31 +147,20 @@ static int64_t sample_count(const import_work *m) {
     return (int64_t)m->mosaic.lattice.width * m->mosaic.lattice.height;
 }
 
-/* The most memory that any moment of the import takes, the process and its libraries included. SQLite's cache is
- * counted whole: what --replace deletes goes through it, too. */
-static bool check_memory(const import_work *m) {
-    double n = (double)sample_count(m), blocks = n / (double)(1 << 2 * m->k) * 2 + 64;
-    double reading = n * (double)import_kind_bytes(m->mosaic.kind) + n +
-                     (double)import_read_bytes(m->sources, m->count) +
-                     fmin((double)GDAL_CACHE_BYTES, n * sizeof(double));
-    double kept = n * sizeof(int32_t) + n + (double)rqt_errors_bytes(&m->mosaic.lattice);
-    double writing =
-        kept + blocks * 64 + (double)import_blocks_bytes(m->k, m->job.options->jobs) + IMPORT_PAGE_CACHE_BYTES;
-    if (m->job.options->minimal) {
-        const double minimal = (double)store_minimal_bytes(&m->mosaic.lattice, m->k, true);
-        if (minimal > (double)STORE_METHOD_MEMORY)
-            return import_refuse(&m->job,
-                                 "%d x %d samples: their minimal errors take %.0f MiB of memory, and %.0f are "
-                                 "allowed; import without --minimal",
-                                 m->mosaic.lattice.width, m->mosaic.lattice.height, ceil(minimal / MIB),
-                                 (double)STORE_METHOD_MEMORY / MIB);
-        writing += minimal;
-    }
-    double need = PROCESS_BYTES + (reading > writing ? reading : writing);
+/* Minimal errors are computed from the whole terrain at once, when everything else is written and let go. */
+static bool check_minimal(const import_work *m) {
+    if (!m->job.options->minimal) return true;
+    const rqt_lattice *l = &m->mosaic.lattice;
+    const double minimal = (double)store_minimal_bytes(l, m->k, true), need = minimal + IMPORT_PROCESS_BYTES;
+    if (minimal > (double)STORE_METHOD_MEMORY)
+        return import_refuse(&m->job,
+                             "%d x %d samples: their minimal errors take %.0f MiB of memory, and %.0f are allowed; "
+                             "import without --minimal",
+                             l->width, l->height, ceil(minimal / MIB), (double)STORE_METHOD_MEMORY / MIB);
     if (need <= (double)m->job.options->memory) return true;
-    return import_refuse(&m->job, "%d x %d samples need %.0f MiB of memory to import; --memory allows %.0f",
-                         m->mosaic.lattice.width, m->mosaic.lattice.height, ceil(need / MIB),
-                         floor((double)m->job.options->memory / MIB));
+    return import_refuse(&m->job,
+                         "%d x %d samples need %.0f MiB of memory to import with --minimal; --memory allows %.0f",
+                         l->width, l->height, ceil(need / MIB), floor((double)m->job.options->memory / MIB));
 }
 
 static bool describe(import_work *m, const char *const *paths) {
@@ -184,7 +175,8 @@ static bool describe(import_work *m, const char *const *paths) {
     m->k = m->job.options->k < m->mosaic.lattice.K ? m->job.options->k : m->mosaic.lattice.K;
     m->cost =
         (rqt_void_cost){.cell = import_crs_cell(&m->crs, &m->mosaic.placement), .c = m->job.options->void_tol};
-    return check_memory(m);
+    return check_minimal(m) &&
+           import_plan_make(&m->job, m->sources, m->count, &m->mosaic, m->k, m->force, &m->plan);
 }
 
 static void tell_extreme(const import_work *m, double value, int64_t times) {
@@ -197,55 +189,103 @@ static void tell_extreme(const import_work *m, double value, int64_t times) {
         (long long)times, raw, raw);
 }
 
-static bool read_heights(import_work *m) {
+/* ------------------------------------------------------------------------------------------ first reading -- */
+static bool start_reader(import_work *m) {
+    const import_reader_options options = {.sources = m->sources,
+                                           .count = m->count,
+                                           .mosaic = &m->mosaic,
+                                           .all = m->plan.in_memory ? &m->all : NULL,
+                                           .strips = m->plan.strips,
+                                           .strip_rows = m->plan.strip_rows};
+    import_reader_free(m->reader);
+    m->reader = NULL;
+    return import_reader_start(&m->job, &options, &m->reader);
+}
+
+static bool take_all(import_work *m) {
+    const rqt_lattice *l = &m->mosaic.lattice;
+    const size_t n = (size_t)sample_count(m);
+    m->all = (import_strip){.kind = m->mosaic.kind, .width = l->width, .rows = l->height};
+    m->all.values = malloc(n * import_kind_bytes(m->mosaic.kind));
+    m->all.valid = malloc(n);
+    return (m->all.values && m->all.valid) || import_no_memory(&m->job, "reading the sources");
+}
+
+static void tell_counts(import_work *m) {
     import_report *report = m->report;
-    double start = now();
-    if (!import_progress(&m->job, "reading", 0, sample_count(m))) return false;
-    if (!import_read(&m->job, m->sources, m->count, &m->mosaic, &m->samples)) return false;
+    const import_counts counts = import_reader_counts(m->reader);
     report->samples = sample_count(m);
-    report->voids = m->samples.voids;
-    report->overlap = m->samples.overlap;
-    report->overlap_differs = m->samples.overlap_differs;
+    report->voids = counts.voids;
+    report->overlap = counts.overlap;
+    report->overlap_differs = counts.overlap_differs;
     if (report->overlap_differs > 0)
         import_notice(&m->job, "%lld of %lld samples that several sources have differ: the later source won",
                       (long long)report->overlap_differs, (long long)report->overlap);
     if (report->voids == report->samples) import_notice(&m->job, "every sample is void");
-    import_survey survey;
-    import_survey_take(&m->samples, &survey);
-    if (import_survey_min_is_suspicious(&survey)) tell_extreme(m, survey.min, survey.min_count);
-    if (import_survey_max_is_suspicious(&survey)) tell_extreme(m, survey.max, survey.max_count);
-    if (!import_quantise(&m->job, &m->samples, &survey, &m->mosaic.scheme, &m->heights)) return false;
+}
+
+/* Looks at the samples, the first of which reads them, until it is clear how they become heights. */
+static bool choose_heights(import_work *m) {
+    const import_kind kind = m->mosaic.kind;
+    const import_scheme *scheme = &m->mosaic.scheme;
+    import_look look = import_look_begin(kind, scheme);
+    import_pass pass = {.pool = m->pool, .reader = m->reader, .keep = m->plan.in_memory, .coarse = &m->coarse};
+    import_decision decision = IMPORT_LOOK_AGAIN;
+    for (bool first = true; decision == IMPORT_LOOK_AGAIN; first = false) {
+        if (!first && !m->plan.in_memory && !start_reader(m)) return false;
+        pass.reader = m->reader;
+        if (!import_look_at_all(&m->job, &pass, &look)) return false;
+        if (first) tell_counts(m);
+        decision = import_decide(&m->job, kind, scheme, &look, &m->heights);
+        if (first && import_survey_min_is_suspicious(&look.survey))
+            tell_extreme(m, look.survey.min, look.survey.min_count);
+        if (first && import_survey_max_is_suspicious(&look.survey))
+            tell_extreme(m, look.survey.max, look.survey.max_count);
+        pass.coarse = NULL;
+        if (m->plan.in_memory) pass.all = &m->all;
+    }
+    return decision == IMPORT_DECIDED;
+}
+
+static bool read_first(import_work *m) {
+    const import_job *job = &m->job;
+    double start = now();
+    if (!import_progress(job, "reading", 0, sample_count(m))) return false;
+    if (m->plan.in_memory && !take_all(m)) return false;
+    if (!import_coarse_create(job, &m->mosaic.lattice, m->mosaic.kind, m->plan.b, &m->coarse) || !start_reader(m) ||
+        !choose_heights(m))
+        return false;
     if (!rqt_unit_is_valid(&m->heights.unit))
-        return import_refuse(&m->job, "%s: its unit, scale (%g) and offset (%g) make no heights in metres",
+        return import_refuse(job, "%s: its unit, scale (%g) and offset (%g) make no heights in metres",
                              m->sources[0].path, m->sources[0].scale, m->sources[0].offset);
-    m->grid = (rqt_grid){.lattice = m->mosaic.lattice, .q = m->heights.q, .valid = m->heights.valid};
-    report->seconds_read = now() - start;
+    m->report->seconds_read = now() - start;
     return true;
 }
 
-static bool errors_progress(void *context, double done) {
-    const import_work *m = context;
-    return import_progress(&m->job, "errors", done, sample_count(m));
-}
-
-static bool compute_errors(import_work *m) {
+/* ----------------------------------------------------------------------------------- errors, blocks, database --
+ */
+static bool make_blocks(import_work *m) {
     double start = now();
-    rqt_status status = rqt_errors_compute(&m->grid, &m->heights.unit, &m->cost, import_allocator(),
-                                           errors_progress, m, &m->errors);
-    if (status == RQT_INTERRUPTED) return false;
-    if (status == RQT_NO_MEMORY) return import_no_memory(&m->job, "computing errors");
-    if (status != RQT_OK) return import_refuse(&m->job, "errors cannot be computed (status %d)", (int)status);
-    rqt_errors_saturate(&m->errors);
+    if (!m->plan.in_memory && !start_reader(m)) return false;
+    m->stream = (import_stream){.lattice = m->mosaic.lattice,
+                                .cost = m->cost,
+                                .k = m->k,
+                                .plan = &m->plan,
+                                .heights = &m->heights,
+                                .has_voids = m->report->voids > 0,
+                                .pool = m->pool,
+                                .coarse = &m->coarse,
+                                .all = m->plan.in_memory ? &m->all : NULL,
+                                .reader = m->reader};
+    bool ok = import_stream_run(&m->job, &m->stream);
+    /* What only the way here needed makes room for SQLite. */
+    import_reader_free(m->reader);
+    m->reader = NULL;
+    free(m->all.values);
+    free(m->all.valid);
+    m->all = (import_strip){0};
     m->report->seconds_errors = now() - start;
-    return import_progress(&m->job, "errors", 1, sample_count(m));
-}
-
-static rqt_code largest_error(const rqt_errors *errors) {
-    rqt_code largest = 0;
-    size_t n = (size_t)errors->columns * (size_t)errors->rows;
-    for (size_t i = 0; i < n; i++)
-        if (errors->code[i] != RQT_CODE_INFINITY && errors->code[i] > largest) largest = errors->code[i];
-    return largest;
+    return ok;
 }
 
 static bool minimal_progress(void *context, double done) {
@@ -271,26 +311,20 @@ static char *provenance(const import_work *m) {
 
 static bool write_terrain(import_work *m, store_terrain *info) {
     const import_job *job = &m->job;
-    rqt_pyramid *pyramid = NULL;
     store_writer *writer = NULL;
     char *detail = NULL;
-    double quantum = fabs(rqt_unit_factor(&info->unit)) / info->unit.d;
-    rqt_status status = rqt_pyramid_create(&m->grid, &m->errors, m->k, import_allocator(), &pyramid);
-    if (status != RQT_OK)
-        return status == RQT_NO_MEMORY ? import_no_memory(job, "making blocks")
-                                       : import_refuse(job, "blocks cannot be made (status %d)", (int)status);
-    bool ok = import_database_begin(job, m->k, &m->database);
+    bool ok = import_database_begin(job, m->k, m->plan.page_cache, &m->database);
     if (ok) {
         int code = store_writer_begin(m->database.db, info, job->options->replace, &writer, &detail);
         if (code != SQLITE_OK) ok = import_database_refuse(job, code, detail);
     }
-    ok = ok && import_blocks(job, pyramid, m->k, quantum, writer, sample_count(m), m->report);
+    ok = ok && import_write(job, &m->stream, writer, m->report);
     if (ok) {
-        int code = store_writer_finish(writer, largest_error(&m->errors), &detail);
+        const rqt_code max_error = m->stream.build ? rqt_build_max_error(m->stream.build) : 0;
+        int code = store_writer_finish(writer, max_error, &detail);
         if (code != SQLITE_OK) ok = import_database_refuse(job, code, detail);
     }
     store_writer_free(writer);
-    rqt_pyramid_free(pyramid);
     if (ok && job->options->minimal) ok = write_minimal(m);
     return ok && import_database_commit(job, &m->database);
 }
@@ -325,27 +359,30 @@ static bool write_database(import_work *m) {
     return ok;
 }
 
-int import_run(const char *const *sources, int count, const char *database, const import_options *options,
-               import_report *report, char *message, size_t message_size) {
-    import_work m = {.job = {options, database, message, message_size}, .count = count, .report = report};
+int import_run_forced(const char *const *sources, int count, const char *database, const import_options *options,
+                      const import_force *force, import_report *report, char *message, size_t message_size) {
+    import_work m = {
+        .job = {options, database, message, message_size}, .force = force, .count = count, .report = report};
     *report = (import_report){0};
     if (message && message_size) message[0] = 0;
     GDALAllRegister();
     /* GDAL's words belong into our sentences, not onto the terminal. */
     CPLPushErrorHandler(CPLQuietErrorHandler);
     GIntBig cache = GDALGetCacheMax64();
-    GDALSetCacheMax64(GDAL_CACHE_BYTES);
 
     bool ok = check_options(&m.job, count) && describe(&m, sources);
     if (ok) name_of(options, &m.sources[0], report->name);
-    ok = ok && import_database_probe(&m.job, report->name) && read_heights(&m) && compute_errors(&m) &&
-         write_database(&m);
+    if (ok) GDALSetCacheMax64(m.plan.gdal_cache);
+    ok = ok && import_database_probe(&m.job, report->name) && import_pool_create(&m.job, &m.pool) &&
+         read_first(&m) && make_blocks(&m) && write_database(&m);
 
     import_database_close(&m.job, &m.database);
-    rqt_errors_free(&m.errors, import_allocator());
-    import_samples_free(&m.samples);
-    free(m.heights.q);
-    free(m.heights.valid);
+    import_reader_free(m.reader);
+    import_stream_free(&m.stream);
+    import_coarse_free(&m.coarse);
+    import_pool_free(m.pool);
+    free(m.all.values);
+    free(m.all.valid);
     import_crs_free(&m.crs);
     import_mosaic_free(&m.mosaic);
     for (int i = 0; i < m.described; i++) import_source_free(&m.sources[i]);
@@ -353,4 +390,9 @@ int import_run(const char *const *sources, int count, const char *database, cons
     GDALSetCacheMax64(cache);
     CPLPopErrorHandler();
     return ok ? 0 : 1;
+}
+
+int import_run(const char *const *sources, int count, const char *database, const import_options *options,
+               import_report *report, char *message, size_t message_size) {
+    return import_run_forced(sources, count, database, options, NULL, report, message, message_size);
 }

@@ -16,12 +16,13 @@ typedef struct import_options {
     const char *unit; /* NULL: the band's; m, ft, us-ft or a number of metres */
     double quantum;   /* --quantum: height step in the source's unit for float bands, 0: chosen */
     double void_tol;  /* c of the outline, > 0 */
-    int jobs;         /* threads that encode blocks */
+    int jobs;         /* threads that work on the samples; another one reads */
     int64_t memory;   /* bytes that the import may take */
     bool replace;
     bool minimal; /* store minimal errors, too */
-    /* Progress: share 0..1 of one stage ("reading", "errors", "blocks"); samples of the whole. NULL: silent. False
-     * stops the import, which leaves the database as it was. */
+    /* Progress: share 0..1 of one stage ("reading", "errors" - and blocks made of them -, "blocks" written,
+     * "minimal errors"); samples of the whole. NULL: silent. False stops the import, which leaves the database as
+     * it was. */
     bool (*progress)(void *context, const char *stage, double done, int64_t samples);
     /* A sentence for the user: what was noticed and done (overlaps that differ, suspicious extremes ...). NULL:
      * none. */
@@ -35,7 +36,9 @@ typedef struct import_report {
     char name[64];
     int64_t samples, voids, blocks, bytes;
     int64_t overlap, overlap_differs; /* samples that more than one source has, and those where they disagree */
-    double seconds_read, seconds_errors, seconds_blocks;
+    double seconds_read;              /* the first reading */
+    double seconds_errors;            /* errors and blocks, with the second reading where there is one */
+    double seconds_blocks;            /* writing them */
 } import_report;
 
 /* Import the sources (one grid, one terrain) into the database file, which is created as a GeoPackage when it does

@@ -7,12 +7,12 @@
  * elevation models are written with few decimals, and then that decimal IS the sample. Otherwise d = 1024, and the
  * rounding is told as quantum_error. z0 is 0 unless heights are too far from 0 to be counted from there.
  *
- * The heights take the memory of the values: int32 is never wider, so that writing stays behind reading.
+ * The first look at the samples tries all of that with z0 = 0. Where the extremes, which it finds at the same time,
+ * ask for another z0, a second look tries again.
  */
 #include "parts.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #define LIMIT ((double)RQT_HEIGHT_LIMIT)
@@ -39,111 +39,118 @@ static bool too_wide(const import_job *job, const import_survey *s, double quant
                          s->min, s->max, quantum);
 }
 
-/* How values are counted: q = round((v / scale - z0) * d). */
-typedef struct steps {
-    int64_t z0;
-    int32_t d;
-    double scale;
-} steps;
-
-static inline int32_t height_of(const steps *s, double v) {
-    if (s->scale != 1) v /= s->scale;
-    return (int32_t)lrint((v - (double)s->z0) * s->d);
+/* Steps that the user chose, in metres: one of d parts of a metre where it is one, else a unit of its own. */
+static import_steps steps_of(double quantum) {
+    double parts = rint(1 / quantum);
+    if (parts >= 1 && parts <= 1 << 20 && fabs(1 / quantum - parts) <= 1e-9 * parts)
+        return (import_steps){.d = (int32_t)parts, .scale = 1};
+    return (import_steps){.d = 1, .scale = quantum};
 }
 
-/* As rqt_unit_metres evaluates it; for integers, in their own unit. */
-static inline double value_of(const steps *s, int32_t q) {
-    return ((double)s->z0 + q / (double)s->d) * s->scale;
+static bool is_whole(import_kind kind) {
+    return kind == IMPORT_I32 || kind == IMPORT_I64;
 }
 
-/* Does every sample come back from its height? */
-static bool is_exact(const import_samples *samples, const steps *s, bool single) {
-    size_t n = (size_t)samples->width * (size_t)samples->height;
-    for (size_t i = 0; i < n; i++) {
-        if (!samples->valid[i]) continue;
-        double v = import_samples_at(samples, i), back = value_of(s, height_of(s, v));
-        if (single ? (float)back != (float)v : back != v) return false;
+/* What rounding costs is half a step, or what it really is where floating point adds to that. */
+static import_trial trial_of(import_steps steps, bool rounds) {
+    return (import_trial){.steps = steps,
+                          .possible = true,
+                          .exact = true,
+                          .wants_rounding = rounds,
+                          .knows_rounding = true,
+                          .rounding = 0.5 * steps.scale / steps.d};
+}
+
+import_look import_look_begin(import_kind kind, const import_scheme *scheme) {
+    import_look look = {.wants_survey = true, .single = scheme->single};
+    if (is_whole(kind)) return import_look_empty(&look);
+    if (scheme->quantum > 0) {
+        look.trial[look.trials++] = trial_of(steps_of(scheme->quantum), true);
+        return import_look_empty(&look);
     }
-    return true;
+    for (int32_t d = 1; d <= 1000; d *= 10)
+        look.trial[look.trials++] = trial_of((import_steps){.d = d, .scale = 1}, false);
+    look.trial[look.trials++] = trial_of((import_steps){.d = 1024, .scale = 1}, true);
+    return import_look_empty(&look);
 }
 
-/* The coarsest decimal steps that are exact, if any. */
-static bool find_decimals(const import_samples *samples, const import_survey *survey, bool single, steps *s) {
-    *s = (steps){.scale = 1};
-    for (s->d = 1; s->d <= 1000; s->d *= 10)
-        if (choose_origin(survey->min, survey->max, s->d, &s->z0) && is_exact(samples, s, single)) return true;
+/* The origin that this trial should have had. True: it had, or needs none; false: it has to be repeated. */
+static bool settle_origin(import_trial *t, const import_survey *s) {
+    int64_t z0;
+    if (!choose_origin(s->min / t->steps.scale, s->max / t->steps.scale, t->steps.d, &z0)) {
+        t->possible = t->exact = false;
+        return true;
+    }
+    if (z0 == t->steps.z0) return true;
+    t->steps.z0 = z0;
+    *t = trial_of(t->steps, t->wants_rounding);
     return false;
 }
 
-/* Steps that the user chose, in metres: one of d parts of a metre where it is one, else a unit of its own. */
-static steps steps_of(double quantum) {
-    double parts = rint(1 / quantum);
-    if (parts >= 1 && parts <= 1 << 20 && fabs(1 / quantum - parts) <= 1e-9 * parts)
-        return (steps){.d = (int32_t)parts, .scale = 1};
-    return (steps){.d = 1, .scale = quantum};
+static import_decision decided(const import_survey *s, const import_steps *steps, double quantum_error,
+                               const import_scheme *scheme, bool whole, import_heights *heights) {
+    *heights = (import_heights){.steps = *steps, .unit = scheme->unit, .quantum_error = quantum_error};
+    heights->unit.z0 = steps->z0;
+    heights->unit.d = steps->d;
+    if (!whole) heights->unit.scale = steps->scale;
+    heights->min_q = s->count ? (int32_t)import_height(steps, s->min) : 0;
+    heights->max_q = s->count ? (int32_t)import_height(steps, s->max) : 0;
+    return IMPORT_DECIDED;
 }
 
-/* What rounding costs: half a step, or what it really was where floating point adds to that. */
-static double rounding_error(const import_samples *samples, const steps *s) {
-    size_t n = (size_t)samples->width * (size_t)samples->height;
-    double largest = 0.5 * s->scale / s->d;
-    for (size_t i = 0; i < n; i++) {
-        if (!samples->valid[i]) continue;
-        double v = import_samples_at(samples, i), off = fabs(value_of(s, height_of(s, v)) - v);
-        if (off > largest) largest = off;
+/* Extremes of no value at all are 0, and values next to an only one are none. */
+static void finish_survey(import_survey *s) {
+    if (!s->count) s->min = s->max = 0;
+    if (!isfinite(s->next_min)) s->next_min = NAN;
+    if (!isfinite(s->next_max)) s->next_max = NAN;
+}
+
+import_decision import_decide(const import_job *job, import_kind kind, const import_scheme *scheme,
+                              import_look *look, import_heights *heights) {
+    import_survey *s = &look->survey;
+    if (look->wants_survey) finish_survey(s);
+    look->wants_survey = false;
+    if (is_whole(kind)) {
+        import_steps steps = {.d = 1, .scale = 1};
+        if (!choose_origin(s->min, s->max, 1, &steps.z0)) {
+            too_wide(job, s, 1);
+            return IMPORT_REFUSED;
+        }
+        return decided(s, &steps, 0, scheme, true, heights);
     }
-    return largest;
-}
-
-/* The values' memory becomes the heights'; 0 where void. */
-static void convert(import_samples *samples, const import_survey *survey, const steps *s, import_heights *h) {
-    size_t n = (size_t)samples->width * (size_t)samples->height;
-    char *memory = samples->values;
-    int32_t low = INT32_MAX, high = INT32_MIN;
-    if (samples->kind == IMPORT_I32 && s->z0 == 0) {
-        /* Already heights, and void samples are 0 since the buffer was. */
-        low = (int32_t)survey->min;
-        high = (int32_t)survey->max;
-    } else {
-        for (size_t i = 0; i < n; i++) {
-            int32_t q = samples->valid[i] ? height_of(s, import_samples_at(samples, i)) : 0;
-            if (samples->valid[i] && q < low) low = q;
-            if (samples->valid[i] && q > high) high = q;
-            memcpy(memory + i * sizeof q, &q, sizeof q);
+    bool again = false;
+    for (int i = 0; i < look->trials; i++)
+        if (!settle_origin(&look->trial[i], s)) again = true;
+    if (again) {
+        look->trial[look->trials - 1].knows_rounding = true;
+        return IMPORT_LOOK_AGAIN;
+    }
+    for (int i = 0; i < look->trials; i++) {
+        import_trial *t = &look->trial[i];
+        if (!t->wants_rounding) {
+            if (t->exact) return decided(s, &t->steps, 0, scheme, false, heights);
+        } else if (!t->possible) {
+            too_wide(job, s, t->steps.scale / t->steps.d);
+        } else if (t->exact || t->knows_rounding) {
+            return decided(s, &t->steps, t->exact ? 0 : t->rounding, scheme, false, heights);
+        } else {
+            t->knows_rounding = true;
+            return IMPORT_LOOK_AGAIN;
         }
     }
-    if (import_kind_bytes(samples->kind) > sizeof(int32_t)) {
-        char *smaller = realloc(memory, n * sizeof(int32_t));
-        if (smaller) memory = smaller;
-    }
-    h->q = (int32_t *)(void *)memory;
-    h->valid = samples->valid;
-    h->min_q = survey->count ? low : 0;
-    h->max_q = survey->count ? high : 0;
-    if (samples->voids == 0) {
-        free(h->valid);
-        h->valid = NULL;
-    }
-    samples->values = NULL;
-    samples->valid = NULL;
+    return IMPORT_REFUSED;
 }
 
-bool import_quantise(const import_job *job, import_samples *samples, const import_survey *survey,
-                     const import_scheme *scheme, import_heights *heights) {
-    bool whole = samples->kind == IMPORT_I32 || samples->kind == IMPORT_I64;
-    steps s = {.d = 1, .scale = 1};
-    *heights = (import_heights){.unit = scheme->unit};
-    if (whole) {
-        if (!choose_origin(survey->min, survey->max, 1, &s.z0)) return too_wide(job, survey, 1);
-    } else if (scheme->quantum > 0 || !find_decimals(samples, survey, scheme->single, &s)) {
-        s = scheme->quantum > 0 ? steps_of(scheme->quantum) : (steps){.d = 1024, .scale = 1};
-        if (!choose_origin(survey->min / s.scale, survey->max / s.scale, s.d, &s.z0))
-            return too_wide(job, survey, s.scale / s.d);
-        if (!is_exact(samples, &s, scheme->single)) heights->quantum_error = rounding_error(samples, &s);
+void import_quantise(const import_strip *strip, size_t at, size_t n, const import_steps *steps, double *values,
+                     int32_t *q) {
+    const uint8_t *valid = strip->valid + at;
+    if (strip->kind == IMPORT_I32 && steps->z0 == 0) {
+        memcpy(q, (const int32_t *)strip->values + at, n * sizeof *q);
+    } else {
+        import_strip_doubles(strip, at, n, values);
+        for (size_t i = 0; i < n; i++) q[i] = valid[i] ? (int32_t)import_height(steps, values[i]) : 0;
     }
-    heights->unit.z0 = s.z0;
-    heights->unit.d = s.d;
-    if (!whole) heights->unit.scale = s.scale;
-    convert(samples, survey, &s, heights);
-    return true;
+    if (memchr(valid, 0, n))
+        for (size_t i = 0; i < n; i++)
+            if (!valid[i]) q[i] = 0;
 }

@@ -1,10 +1,12 @@
-/* read.c - GDAL windows -> values and validity of the whole grid.
+/* read.c - GDAL windows -> values and validity of some rows of the grid.
  *
- * A source is read in strips of whole rows, as tall as GDAL's own blocks or taller, so that every compressed block
- * is decoded once; each strip is then merged into the grid, turned north-up and west-first on the way. A sample is
+ * A strip is read from every source that meets its rows, turned north-up and west-first on the way. A sample is
  * void when it is a declared or given nodata value, NaN, or masked. A void never replaces data; data replaces
  * earlier data, and while that happens bits in `valid` remember it, so that three sources over one place count it
  * once.
+ *
+ * A source is open while strips meet it, so that the rows of a GDAL block which a strip leaves over come out of
+ * GDAL's cache, and every compressed block is decoded once.
  */
 #include "source.h"
 
@@ -18,23 +20,6 @@
 #define HAS_DATA 1
 #define OVERLAPS 2
 #define DIFFERS 4
-
-static size_t strip_rows(const import_source *s) {
-    size_t row = (size_t)s->width * sizeof(double), block = s->block_rows > 0 ? (size_t)s->block_rows : 1;
-    size_t rows = IMPORT_STRIP_BYTES / row / block * block;
-    if (rows < block) rows = block;
-    return rows < (size_t)s->height ? rows : (size_t)s->height;
-}
-
-size_t import_read_bytes(const import_source *sources, int count) {
-    size_t largest = 0;
-    for (int i = 0; i < count; i++) {
-        /* Values and mask of a strip; the same again for the row of blocks that GDAL decodes it from. */
-        size_t bytes = strip_rows(&sources[i]) * (size_t)sources[i].width * (2 * sizeof(double) + 1);
-        if (bytes > largest) largest = bytes;
-    }
-    return largest;
-}
 
 /* ------------------------------------------------------------------------------------------------- voids -- */
 typedef struct voids {
@@ -80,7 +65,7 @@ static inline bool is_void_real(const voids *v, double value) {
 /* ------------------------------------------------------------------------------------------------- merge -- */
 /* One row of a source on its way into the grid. */
 typedef struct merge {
-    import_samples *grid;
+    import_strip *grid;
     const import_source *source;
     voids voids;
     rqt_unit unit;
@@ -169,112 +154,224 @@ static int32_t merge_row(const merge *m, const char *row, const uint8_t *mask) {
     return merge_f64(m, (const double *)(const void *)row, mask);
 }
 
-/* ------------------------------------------------------------------------------------------------- source -- */
-typedef struct reading {
-    const import_job *job;
-    import_samples *grid;
-    int64_t before, total; /* samples of the sources: read before this one, in all */
-    int64_t whole;         /* samples of the grid, for the progress */
-} reading;
+/* ------------------------------------------------------------------------------------------------- strips -- */
+#define MOST_OPEN 200 /* sources; beyond, each is closed after every strip */
 
-static bool read_strips(const reading *r, const import_source *s, GDALRasterBandH band, int32_t column, int32_t row,
-                        char *strip, uint8_t *mask) {
-    static const GDALDataType types[] = {GDT_Int32, GDT_Int64, GDT_Float32, GDT_Float64};
-    size_t element = import_kind_bytes(r->grid->kind), tall = strip_rows(s);
-    GDALRasterBandH mask_band = s->has_mask ? GDALGetMaskBand(band) : NULL;
-    merge m = {.grid = r->grid, .source = s, .voids = voids_of(s, r->job->options), .unit = import_source_unit(s)};
+struct import_reading {
+    const import_job *job;
+    const import_source *sources;
+    const import_mosaic *mosaic;
+    int count, open;
+    GDALDatasetH *dataset; /* of each source; NULL: closed */
+    char *rows;            /* of a source, as they are in its file */
+    uint8_t *mask;
+};
+
+static const GDALDataType gdal_types[] = {GDT_Int32, GDT_Int64, GDT_Float32, GDT_Float64};
+
+static int32_t smaller(int32_t a, int32_t b) {
+    return a < b ? a : b;
+}
+
+static void widest(const import_source *sources, int count, int32_t strip_rows, size_t *samples, size_t *masked) {
+    *samples = *masked = 0;
+    for (int i = 0; i < count; i++) {
+        const size_t n = (size_t)sources[i].width * (size_t)smaller(sources[i].height, strip_rows);
+        if (n > *samples) *samples = n;
+        if (sources[i].has_mask && n > *masked) *masked = n;
+    }
+}
+
+size_t import_reading_bytes(const import_source *sources, int count, import_kind kind, int32_t strip_rows) {
+    size_t samples, masked;
+    widest(sources, count, strip_rows, &samples, &masked);
+    return samples * import_kind_bytes(kind) + masked;
+}
+
+int64_t import_reading_cache(const import_source *sources, int count, const import_mosaic *mosaic,
+                             int32_t strip_rows) {
+    int64_t most = 0;
+    for (int i = 0; i < count; i++) {
+        /* All sources that the strip at the beginning of this one may meet, a row of blocks each. */
+        int64_t bytes = 0;
+        for (int j = 0; j < count; j++) {
+            const import_source *s = &sources[j];
+            if (mosaic->row[j] >= mosaic->row[i] + strip_rows || mosaic->row[j] + s->height <= mosaic->row[i])
+                continue;
+            const int64_t across = (s->width + s->block_columns - 1) / s->block_columns;
+            bytes += across * s->block_columns * s->block_rows *
+                     (GDALGetDataTypeSizeBytes(s->type) + (s->has_mask ? 1 : 0));
+        }
+        if (bytes > most) most = bytes;
+    }
+    return most;
+}
+
+bool import_reading_open(const import_job *job, const import_source *sources, int count,
+                         const import_mosaic *mosaic, int32_t strip_rows, import_reading **reading) {
+    size_t samples, masked;
+    widest(sources, count, strip_rows, &samples, &masked);
+    import_reading *r = *reading = calloc(1, sizeof *r);
+    if (r) {
+        *r = (import_reading){.job = job, .sources = sources, .count = count, .mosaic = mosaic};
+        r->dataset = calloc((size_t)count, sizeof(GDALDatasetH));
+        r->rows = malloc(samples * import_kind_bytes(mosaic->kind));
+        r->mask = malloc(masked ? masked : 1);
+    }
+    return (r && r->dataset && r->rows && r->mask) || import_no_memory(job, "reading the sources");
+}
+
+static void shut(import_reading *r, int source) {
+    if (!r->dataset[source]) return;
+    GDALClose(r->dataset[source]);
+    r->dataset[source] = NULL;
+    r->open--;
+}
+
+void import_reading_close(import_reading *r) {
+    if (!r) return;
+    for (int i = 0; r->dataset && i < r->count; i++) shut(r, i);
+    free(r->dataset);
+    free(r->rows);
+    free(r->mask);
+    free(r);
+}
+
+static bool opened(import_reading *r, int source) {
+    const import_source *s = &r->sources[source];
+    if (r->dataset[source]) return true;
+    CPLErrorReset();
+    GDALDatasetH d =
+        GDALOpenEx(s->opened, GDAL_OF_RASTER | GDAL_OF_READONLY | GDAL_OF_VERBOSE_ERROR, NULL, NULL, NULL);
+    r->dataset[source] = d;
+    r->open += d != NULL;
+    return (d && GDALGetRasterXSize(d) == s->width && GDALGetRasterYSize(d) == s->height) ||
+           import_refuse(r->job, "%s has changed while it was imported%s%s", s->path, d ? "" : ": ",
+                         d ? "" : CPLGetLastErrorMsg());
+}
+
+static bool unreadable(const import_reading *r, const import_source *s, int32_t top, int32_t rows) {
+    return import_refuse(r->job, "%s: rows %d to %d cannot be read: %s", s->path, top, top + rows - 1,
+                         CPLGetLastErrorMsg());
+}
+
+/* The only source of a whole strip, integers in the order of the grid: straight into the strip. Returns the number
+ * of voids, or -1. */
+static int64_t read_directly(import_reading *r, int source, import_strip *strip) {
+    const import_source *s = &r->sources[source];
+    const size_t n = (size_t)strip->rows * (size_t)strip->width;
+    const int32_t *values = strip->values;
+    uint8_t *valid = strip->valid;
+    const voids v = voids_of(s, r->job->options);
+    CPLErrorReset();
+    if (GDALRasterIO(GDALGetRasterBand(r->dataset[source], 1), GF_Read, 0, strip->first_row, s->width, strip->rows,
+                     strip->values, s->width, strip->rows, GDT_Int32, 0, 0) != CE_None) {
+        (void)unreadable(r, s, strip->first_row, strip->rows);
+        return -1;
+    }
+    if (v.count == 0) {
+        memset(valid, HAS_DATA, n);
+        return 0;
+    }
+    int64_t found = 0;
+    for (size_t y = 0; y < (size_t)strip->rows; y++) {
+        const int32_t *from = values + y * (size_t)strip->width;
+        uint8_t *to = valid + y * (size_t)strip->width;
+        uint32_t marks = 0;
+        if (v.count == 1 && v.integer[0] == (int32_t)v.integer[0]) {
+            const int32_t mark = (int32_t)v.integer[0];
+            for (int32_t i = 0; i < strip->width; i++) to[i] = from[i] != mark;
+        } else {
+            for (int32_t i = 0; i < strip->width; i++) to[i] = !is_void_integer(&v, from[i]);
+        }
+        for (int32_t i = 0; i < strip->width; i++) marks += !to[i];
+        found += marks;
+    }
+    return found;
+}
+
+/* rows: of the file, from top on. The strip's row of the first one and the direction from there. */
+static bool read_merging(import_reading *r, int source, int32_t top, int32_t rows, import_strip *strip,
+                         int32_t row) {
+    const import_source *s = &r->sources[source];
+    GDALRasterBandH band = GDALGetRasterBand(r->dataset[source], 1);
+    const size_t element = import_kind_bytes(strip->kind);
+    merge m = {.grid = strip, .source = s, .voids = voids_of(s, r->job->options), .unit = import_source_unit(s)};
     m.factor = rqt_unit_factor(&m.unit);
     m.scaled = m.factor != 1 || m.unit.offset != 0;
     m.forward = s->flip_columns ? -1 : 1;
-    int first = s->flip_columns ? s->width - 1 : 0;
-    for (int32_t top = 0; top < s->height; top += (int32_t)tall) {
-        int rows = s->height - top < (int32_t)tall ? s->height - top : (int32_t)tall;
-        CPLErrorReset();
-        CPLErr failed =
-            GDALRasterIO(band, GF_Read, 0, top, s->width, rows, strip, s->width, rows, types[r->grid->kind], 0, 0);
-        if (failed == CE_None && mask_band)
-            failed = GDALRasterIO(mask_band, GF_Read, 0, top, s->width, rows, mask, s->width, rows, GDT_Byte, 0, 0);
-        if (failed != CE_None)
-            return import_refuse(r->job, "%s: rows %d to %d cannot be read: %s", s->path, top, top + rows - 1,
-                                 CPLGetLastErrorMsg());
-        for (int y = 0; y < rows; y++) {
-            int32_t from = top + y, to = row + (s->flip_rows ? s->height - 1 - from : from);
-            m.target = (size_t)to * (size_t)r->grid->width + (size_t)(column + first);
-            int32_t infinite = merge_row(&m, strip + (size_t)y * (size_t)s->width * element,
-                                         mask_band ? mask + (size_t)y * (size_t)s->width : NULL);
-            if (infinite >= 0)
-                return import_refuse(r->job,
-                                     "%s: the height at column %d, row %d is infinite; if infinity marks voids "
-                                     "there, say --nodata inf (or -inf)",
-                                     s->path, infinite, from);
-        }
-        double done = (double)(r->before + (int64_t)(top + rows) * s->width) / (double)r->total;
-        if (!import_progress(r->job, "reading", done, r->whole)) return false;
+    const int32_t first = r->mosaic->column[source] + (s->flip_columns ? s->width - 1 : 0);
+    CPLErrorReset();
+    CPLErr failed =
+        GDALRasterIO(band, GF_Read, 0, top, s->width, rows, r->rows, s->width, rows, gdal_types[strip->kind], 0, 0);
+    if (failed == CE_None && s->has_mask)
+        failed = GDALRasterIO(GDALGetMaskBand(band), GF_Read, 0, top, s->width, rows, r->mask, s->width, rows,
+                              GDT_Byte, 0, 0);
+    if (failed != CE_None) return unreadable(r, s, top, rows);
+    for (int32_t y = 0; y < rows; y++) {
+        const int32_t to = s->flip_rows ? row + rows - 1 - y : row + y;
+        m.target = (size_t)to * (size_t)strip->width + (size_t)first;
+        const int32_t infinite = merge_row(&m, r->rows + (size_t)y * (size_t)s->width * element,
+                                           s->has_mask ? r->mask + (size_t)y * (size_t)s->width : NULL);
+        if (infinite >= 0)
+            return import_refuse(r->job,
+                                 "%s: the height at column %d, row %d is infinite; if infinity marks voids there, "
+                                 "say --nodata inf (or -inf)",
+                                 s->path, infinite, top + y);
     }
     return true;
 }
 
-static bool read_source(const reading *r, const import_source *s, int32_t column, int32_t row) {
-    size_t n = strip_rows(s) * (size_t)s->width;
-    char *strip = malloc(n * import_kind_bytes(r->grid->kind));
-    uint8_t *mask = s->has_mask ? malloc(n) : NULL;
-    CPLErrorReset();
-    GDALDatasetH dataset =
-        GDALOpenEx(s->opened, GDAL_OF_RASTER | GDAL_OF_READONLY | GDAL_OF_VERBOSE_ERROR, NULL, NULL, NULL);
-    bool ok = false;
-    if (!strip || (s->has_mask && !mask))
-        import_no_memory(r->job, "reading a source");
-    else if (!dataset || GDALGetRasterXSize(dataset) != s->width || GDALGetRasterYSize(dataset) != s->height)
-        import_refuse(r->job, "%s has changed while it was imported%s%s", s->path, dataset ? "" : ": ",
-                      dataset ? "" : CPLGetLastErrorMsg());
-    else
-        ok = read_strips(r, s, GDALGetRasterBand(dataset, 1), column, row, strip, mask);
-    if (dataset) GDALClose(dataset);
-    free(strip);
-    free(mask);
-    return ok;
-}
-
 /* Bits of the merge -> 0 and 1, and the counts. */
-static void settle(import_samples *grid) {
-    size_t n = (size_t)grid->width * (size_t)grid->height;
+static void settle(import_strip *strip, import_counts *counts) {
+    const size_t n = (size_t)strip->width * (size_t)strip->rows;
     int64_t data = 0, overlap = 0, differs = 0;
     for (size_t i = 0; i < n; i++) {
-        uint8_t bits = grid->valid[i];
+        const uint8_t bits = strip->valid[i];
         data += bits & HAS_DATA;
         overlap += (bits & OVERLAPS) != 0;
         differs += (bits & DIFFERS) != 0;
-        grid->valid[i] = bits & HAS_DATA;
+        strip->valid[i] = bits & HAS_DATA;
     }
-    grid->voids = (int64_t)n - data;
-    grid->overlap = overlap;
-    grid->overlap_differs = differs;
+    counts->voids += (int64_t)n - data;
+    counts->overlap += overlap;
+    counts->overlap_differs += differs;
 }
 
-bool import_read(const import_job *job, const import_source *sources, int count, const import_mosaic *mosaic,
-                 import_samples *samples) {
-    size_t n = (size_t)mosaic->lattice.width * (size_t)mosaic->lattice.height;
-    *samples =
-        (import_samples){.kind = mosaic->kind, .width = mosaic->lattice.width, .height = mosaic->lattice.height};
-    samples->values = calloc(n, import_kind_bytes(mosaic->kind));
-    samples->valid = calloc(n, 1);
-    if (!samples->values || !samples->valid) return import_no_memory(job, "reading the sources");
-    reading r = {.job = job, .grid = samples, .whole = (int64_t)n};
-    for (int i = 0; i < count; i++) r.total += (int64_t)sources[i].width * sources[i].height;
-    for (int i = 0; i < count; i++) {
-        if (!read_source(&r, &sources[i], mosaic->column[i], mosaic->row[i])) return false;
-        r.before += (int64_t)sources[i].width * sources[i].height;
+/* Can it be read without merging? */
+static bool is_direct(const import_reading *r, int source, const import_strip *strip) {
+    const import_source *s = &r->sources[source];
+    return r->count == 1 && strip->kind == IMPORT_I32 && !s->has_mask && !s->is_signed_byte && !s->flip_rows &&
+           !s->flip_columns;
+}
+
+/* What the strip wants of one source. */
+static bool merge_source(import_reading *r, int source, import_strip *strip) {
+    const import_source *s = &r->sources[source];
+    const int32_t row = r->mosaic->row[source];
+    const int32_t from = row > strip->first_row ? row : strip->first_row;
+    const int32_t to = smaller(row + s->height, strip->first_row + strip->rows);
+    if (from >= to) return true;
+    const int32_t top = s->flip_rows ? row + s->height - to : from - row;
+    if (!opened(r, source) || !read_merging(r, source, top, to - from, strip, from - strip->first_row))
+        return false;
+    if (to == row + s->height || r->open > MOST_OPEN) shut(r, source);
+    return true;
+}
+
+bool import_reading_strip(import_reading *r, import_strip *strip, import_counts *counts) {
+    if (is_direct(r, 0, strip)) {
+        const int64_t found = opened(r, 0) ? read_directly(r, 0, strip) : -1;
+        if (found >= 0) counts->voids += found;
+        return found >= 0;
     }
-    settle(samples);
+    memset(strip->valid, 0, (size_t)strip->rows * (size_t)strip->width);
+    for (int i = 0; i < r->count; i++)
+        if (!merge_source(r, i, strip)) return false;
+    settle(strip, counts);
     return true;
 }
 
 size_t import_kind_bytes(import_kind kind) {
     return kind == IMPORT_I32 || kind == IMPORT_F32 ? 4 : 8;
-}
-
-void import_samples_free(import_samples *samples) {
-    free(samples->values);
-    free(samples->valid);
-    *samples = (import_samples){0};
 }

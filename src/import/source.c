@@ -241,8 +241,7 @@ bool import_source_describe(const import_job *job, const char *path, import_sour
         GDALRasterBandH band = GDALGetRasterBand(dataset, 1);
         s->width = GDALGetRasterXSize(dataset);
         s->height = GDALGetRasterYSize(dataset);
-        int block_columns;
-        GDALGetBlockSize(band, &block_columns, &s->block_rows);
+        GDALGetBlockSize(band, &s->block_columns, &s->block_rows);
         OGRSpatialReferenceH crs = GDALGetSpatialRef(dataset);
         if (crs) {
             s->crs = OSRClone(crs);

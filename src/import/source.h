@@ -17,12 +17,12 @@ typedef struct import_source {
     bool is_wide;             /* an integer that int32 does not hold */
     bool is_signed_byte;      /* GDAL before 3.7 calls int8 Byte, with a note */
     int32_t width, height;
-    int32_t block_rows;           /* rows that GDAL likes to read at once */
-    bool placed;                  /* has a geotransform */
-    bool flip_rows, flip_columns; /* file order to north-first, west-first */
-    rqt_placement placement;      /* of the north-west sample; dx > 0, dy < 0 */
-    OGRSpatialReferenceH crs;     /* NULL: none */
-    double scale, offset;         /* of the band */
+    int32_t block_rows, block_columns; /* what GDAL decodes at once */
+    bool placed;                       /* has a geotransform */
+    bool flip_rows, flip_columns;      /* file order to north-first, west-first */
+    rqt_placement placement;           /* of the north-west sample; dx > 0, dy < 0 */
+    OGRSpatialReferenceH crs;          /* NULL: none */
+    double scale, offset;              /* of the band */
     import_unit unit;
     bool has_nodata;
     double nodata;
@@ -66,10 +66,19 @@ bool import_mosaic_plan(const import_job *job, const import_source *sources, int
 void import_mosaic_free(import_mosaic *mosaic);
 
 /* --------------------------------------------------------------------------------------------------- read.c -- */
-bool import_read(const import_job *job, const import_source *sources, int count, const import_mosaic *mosaic,
-                 import_samples *samples);
-#define IMPORT_STRIP_BYTES (4 << 20) /* of values that are read at once, unless GDAL's own blocks are taller */
-/* Bytes of the buffers that reading takes beside the samples. */
-size_t import_read_bytes(const import_source *sources, int count);
+typedef struct import_reading import_reading;
+
+/* strip_rows: the most rows of a strip. */
+bool import_reading_open(const import_job *job, const import_source *sources, int count,
+                         const import_mosaic *mosaic, int32_t strip_rows, import_reading **reading);
+void import_reading_close(import_reading *reading);
+/* Rows first_row .. first_row + rows - 1 of the grid into the strip's arrays, from all sources that meet them.
+ * Strips come from north to south. Adds to counts. */
+bool import_reading_strip(import_reading *reading, import_strip *strip, import_counts *counts);
+/* Bytes of the buffers that reading strips takes beside them, and of the cache in which GDAL keeps each of its
+ * blocks until all of its rows have been asked for. */
+size_t import_reading_bytes(const import_source *sources, int count, import_kind kind, int32_t strip_rows);
+int64_t import_reading_cache(const import_source *sources, int count, const import_mosaic *mosaic,
+                             int32_t strip_rows);
 
 #endif
