@@ -135,7 +135,7 @@ check-layers: ## modules depend one way only; librqt.a and rqt.so mention only w
 	@$(MAKE) --no-print-directory -j2 products
 	@BUILD=$(BUILD) ./tests/check_layers.sh
 
-FORMATTED = $(wildcard src/*/*.[ch] src/geo/*.cpp ext/*.[ch] tests/*.[ch] tests/bench/*.[ch])
+FORMATTED = $(wildcard src/*/*.[ch] src/geo/*.cpp ext/*.[ch] tests/*.[ch] tests/bench/*.[ch] tests/bench/peers/*.[ch])
 .PHONY: format check-format
 format: ## lay the sources out (clang-format)
 	@./src/install-packages.sh format
@@ -154,7 +154,7 @@ check-docs: ## fail when ext/SQL.md or the README's session are not what the pro
 	@BUILD=$(BUILD) ./tests/check_readme.sh
 
 # ---------------------------------------------------------------------------------------------------- benches
-.PHONY: bench bench-table1
+.PHONY: bench bench-table1 chart peers
 bench: ## speed and size beside GDAL's, medians of five and more
 	@./src/install-packages.sh build test
 	@$(MAKE) --no-print-directory -j2 products
@@ -163,6 +163,17 @@ bench-table1: ## share of vertices over eps beside the paper's table 1
 	@./src/install-packages.sh build test
 	@$(MAKE) --no-print-directory -j2 products
 	@BUILD=$(BUILD) ./tests/bench/bench_table1.sh
+
+chart: ## speed against accuracy, drawn: pictures in build/chart; peers from npm where there is one; DATA=dir
+	@./src/install-packages.sh build test
+	@./src/install-packages.sh peers || echo "No node: the charts go without peers" >&2
+	@$(MAKE) --no-print-directory -j2 products
+	@BUILD=$(BUILD) DATA="$(if $(filter command% environment%,$(origin DATA)),$(DATA))" DOCS=$(DOCS) ./tests/bench/chart.sh
+peers: ## vertices at equal true error beside a greedy TIN and RTIN, for six DEMs of DATA=dir
+	@./src/install-packages.sh build test
+	@./src/install-packages.sh peers || echo "No node: the table goes without peers" >&2
+	@$(MAKE) --no-print-directory -j2 products
+	@BUILD=$(BUILD) DATA="$(DATA)" OUT=$(BUILD)/chart ./tests/bench/peers.sh
 
 # ---------------------------------------------------------------------------------------------------- install
 PREFIX ?= /usr/local

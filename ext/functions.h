@@ -71,18 +71,24 @@ typedef struct request {
     rqt_region *region;
     double eps;
     store_query_options options;
+    bool fans;            /* the strip goes round the centres of blocks */
+    int64_t max_vertices; /* 0: any number */
+    double achieved_eps;  /* of the mesh: eps, or more to keep within max_vertices; known after request_patch */
 } request;
 
 int request_read(connection *c, sqlite3_value *region, sqlite3_value *eps, sqlite3_value *terrain,
                  sqlite3_value *options, request *out, char **error);
-int request_patch(request *r, rqt_patch *patch, store_reads *reads, char **error);
+/* A patch with what the product needs; of strips, the one that the options want. Give it back with store_keep. */
+int request_patch(request *r, rqt_product product, rqt_patch *patch, store_reads *reads, char **error);
+/* The patch in wire format. delta.c */
+int wire_mesh(request *r, uint8_t **bytes, size_t *size, char **error);
 void request_free(request *r);
 /* The terrain that a value names; NULL value: the only one. */
 int request_terrain(store *s, sqlite3_value *name, const store_terrain **terrain, char **error);
 /* "what must be a number ...": false and a sentence when the value is none, or NaN. */
 bool request_number(sqlite3_value *value, const char *what, double *number, char **error);
 /* Options of the contract; sentences name what is unknown and what is not in this version. options.c */
-int options_read(const char *json, store_query_options *options, char **error);
+int options_read(const char *json, request *r, char **error);
 
 /* A sentence into *error; returns SQLITE_ERROR, or SQLITE_NOMEM. */
 int fail(char **error, const char *format, ...);
@@ -92,5 +98,6 @@ fill_rows fill_range, fill_triangles, fill_strip;                          /* me
 fill_rows fill_terrains, fill_explain, fill_verify, fill_check, fill_help; /* insight_tables.c, verify_table.c */
 scalar_call call_version, call_build_info, call_bbox, call_circle, call_mesh, call_height; /* scalar.c */
 scalar_call call_block_info, call_block_check, call_block_dump;                            /* block_functions.c */
+scalar_call call_delta;                                                                    /* delta.c */
 
 #endif

@@ -140,6 +140,7 @@ typedef struct explanation {
     rqt_lattice lattice;
     int k;
     rqt_placement placement;
+    double achieved_eps;
 } explanation;
 
 static void release_explanation(void *data) {
@@ -173,8 +174,15 @@ static void explain_column(void *data, size_t row, int column, sqlite3_context *
         break;
     }
     case 2:
-        text(result, read->needs_bytes ? "answers eps; its centre is selected, so its bytes are walked"
-                                       : "answers eps; nothing is selected inside, so its index row is enough");
+        if (read->computed)
+            text(result,
+                 read->needs_bytes
+                     ? "answers eps; made in memory, for the metric is not stored, and walked"
+                     : "answers eps; made in memory, for the metric is not stored; nothing is selected inside");
+        else
+            text(result, read->needs_bytes ? "answers eps; its centre is selected, so its bytes are walked"
+                         : read->outside   ? "answers eps; it only touches the region, so its index row is enough"
+                                           : "answers eps; nothing is selected inside, so its index row is enough");
         break;
     case 3:
         sqlite3_result_int64(result, read->bytes);
@@ -184,6 +192,9 @@ static void explain_column(void *data, size_t row, int column, sqlite3_context *
         break;
     case 5:
         sqlite3_result_int64(result, read->selected);
+        break;
+    case 7:
+        sqlite3_result_double(result, e->achieved_eps);
         break;
     default:
         sqlite3_result_int64(result, (sqlite3_int64)read->number);
@@ -200,9 +211,10 @@ int fill_explain(connection *c, sqlite3_value **arguments, row_set *rows, char *
     rqt_patch patch = {0};
     if (e) {
         *e = (explanation){.lattice = r.terrain->lattice, .k = r.terrain->k, .placement = r.terrain->placement};
-        code = request_patch(&r, &patch, &e->reads, error);
+        code = request_patch(&r, RQT_PRODUCT_VERTICES, &patch, &e->reads, error);
+        e->achieved_eps = r.achieved_eps;
     }
-    rqt_patch_free(&patch);
+    if (r.store) store_keep(r.store, &patch);
     request_free(&r);
     if (code != SQLITE_OK) {
         sqlite3_free(e);

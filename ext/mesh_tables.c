@@ -8,24 +8,34 @@
 typedef struct mesh {
     rqt_patch patch;
     format_frame frame;
-    uint32_t *strip;
+    double factor; /* rqt_unit_factor */
+    store *store;  /* lives as long as the table does */
+    double achieved_eps;
 } mesh;
 
 static void release(void *data) {
     mesh *m = data;
-    rqt_patch_free(&m->patch);
-    sqlite3_free(m->strip);
+    store_keep(m->store, &m->patch);
     sqlite3_free(m);
 }
 
+/* As format_coordinates says them, but only the one. */
 static void put_coordinate(const mesh *m, uint32_t vertex, int which, sqlite3_context *result) {
-    double xyz[3];
-    format_coordinates(&m->frame, &m->patch.vertices[vertex], xyz);
-    sqlite3_result_double(result, xyz[which]);
+    const rqt_patch_vertex *v = &m->patch.vertices[vertex];
+    const rqt_placement *at = &m->frame.placement;
+    const rqt_unit *unit = &m->frame.unit;
+    double value;
+    if (which == 0)
+        value = at->x0 + v->col * at->dx;
+    else if (which == 1)
+        value = at->y0 + v->row * at->dy;
+    else
+        value = ((double)unit->z0 + (double)v->q / (double)unit->d) * m->factor + unit->offset;
+    sqlite3_result_double(result, value);
 }
 
 /* The mesh of the arguments, not yet as rows. */
-static int make_mesh(connection *c, sqlite3_value **arguments, bool strip, row_set *rows, mesh **out,
+static int make_mesh(connection *c, sqlite3_value **arguments, rqt_product product, row_set *rows, mesh **out,
                      char **error) {
     request r;
     int code = request_read(c, arguments[0], arguments[1], arguments[2], arguments[3], &r, error);
@@ -35,11 +45,11 @@ static int make_mesh(connection *c, sqlite3_value **arguments, bool strip, row_s
     if (m) {
         memset(m, 0, sizeof *m);
         m->frame = (format_frame){.placement = r.terrain->placement, .unit = r.terrain->unit, .eps = r.eps};
-        code = request_patch(&r, &m->patch, NULL, error);
+        m->factor = rqt_unit_factor(&m->frame.unit);
+        m->store = r.store;
+        code = request_patch(&r, product, &m->patch, NULL, error);
+        m->achieved_eps = r.achieved_eps;
     }
-    size_t indices = 0;
-    if (code == SQLITE_OK && strip && rqt_strip_build(&m->patch, store_allocator(), &m->strip, &indices) != RQT_OK)
-        code = SQLITE_NOMEM;
     request_free(&r);
     if (code != SQLITE_OK) {
         if (m) release(m);
@@ -47,7 +57,7 @@ static int make_mesh(connection *c, sqlite3_value **arguments, bool strip, row_s
     }
     rows->data = m;
     rows->release = release;
-    rows->count = indices;
+    rows->count = m->patch.strip_count;
     *out = m;
     return SQLITE_OK;
 }
@@ -61,13 +71,15 @@ static void range_column(void *data, size_t row, int column, sqlite3_context *re
         sqlite3_result_double(result, rqt_code_metres(v->error));
     else if (column == 4)
         sqlite3_result_int(result, v->level);
+    else if (column == 8)
+        sqlite3_result_double(result, m->achieved_eps);
     else
         sqlite3_result_int(result, column == 5 ? v->col : column == 6 ? v->row : v->q);
 }
 
 int fill_range(connection *c, sqlite3_value **arguments, row_set *rows, char **error) {
     mesh *m;
-    const int code = make_mesh(c, arguments, false, rows, &m, error);
+    const int code = make_mesh(c, arguments, RQT_PRODUCT_VERTICES, rows, &m, error);
     if (code != SQLITE_OK) return code;
     rows->count = m->patch.vertex_count;
     rows->column = range_column;
@@ -78,13 +90,15 @@ static void triangles_column(void *data, size_t row, int column, sqlite3_context
     const mesh *m = data;
     if (column == 0)
         sqlite3_result_int64(result, (sqlite3_int64)row + 1);
+    else if (column == 10)
+        sqlite3_result_double(result, m->achieved_eps);
     else
         put_coordinate(m, m->patch.triangles[3 * row + (size_t)(column - 1) / 3], (column - 1) % 3, result);
 }
 
 int fill_triangles(connection *c, sqlite3_value **arguments, row_set *rows, char **error) {
     mesh *m;
-    const int code = make_mesh(c, arguments, false, rows, &m, error);
+    const int code = make_mesh(c, arguments, RQT_PRODUCT_TRIANGLES, rows, &m, error);
     if (code != SQLITE_OK) return code;
     rows->count = m->patch.triangle_count;
     rows->column = triangles_column;
@@ -95,13 +109,15 @@ static void strip_column(void *data, size_t row, int column, sqlite3_context *re
     const mesh *m = data;
     if (column == 0)
         sqlite3_result_int64(result, (sqlite3_int64)row);
+    else if (column == 4)
+        sqlite3_result_double(result, m->achieved_eps);
     else
-        put_coordinate(m, m->strip[row], column - 1, result);
+        put_coordinate(m, m->patch.strip[row], column - 1, result);
 }
 
 int fill_strip(connection *c, sqlite3_value **arguments, row_set *rows, char **error) {
     mesh *m;
-    const int code = make_mesh(c, arguments, true, rows, &m, error);
+    const int code = make_mesh(c, arguments, RQT_PRODUCT_STRIP, rows, &m, error);
     if (code == SQLITE_OK) rows->column = strip_column;
     return code;
 }

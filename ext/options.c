@@ -3,22 +3,23 @@
 #include "functions.h"
 
 #include <cjson/cJSON.h>
+#include <math.h>
 #include <string.h>
 
 typedef struct choice {
     const char *key;
-    const char *done;    /* values that work, between blanks */
+    const char *done;    /* values that work, between blanks; "#": an integer of 4 or more */
     const char *pending; /* values of the contract that are not in this version; "*": any value */
 } choice;
 
 static const choice choices[] = {
     {"mode", " cover ", " snap border cut "},
     {"outline", " exact ", " tol "},
-    {"metric", " exact ", " minimal local wedgie euclid "},
+    {"metric", " exact minimal local wedgie euclid ", ""},
     {"select", " threshold topdown bottomup ", ""},
-    {"strip", " bintree ", " fan "},
+    {"strip", " bintree fan ", ""},
     {"detail", "", "*"},
-    {"max_vertices", "", "*"},
+    {"max_vertices", "#", ""},
     {"max_triangles", "", "*"},
     {"previous", "", "*"},
     {"frame", "", "*"},
@@ -33,12 +34,27 @@ static bool holds(const char *words, const char *word) {
     return false;
 }
 
-static int read_one(const cJSON *item, store_query_options *options, char **error) {
+/* The value's number in the list of those that work. */
+static int index_of(const choice *c, const char *value) {
+    int n = 0;
+    const char *const found = strstr(c->done, value);
+    for (const char *p = c->done + 1; p < found; p++) n += *p == ' ';
+    return n;
+}
+
+static int read_one(const cJSON *item, request *r, char **error) {
     const choice *c = NULL;
     for (size_t i = 0; i < sizeof choices / sizeof *choices; i++)
         if (strcmp(choices[i].key, item->string) == 0) c = &choices[i];
     if (!c) return fail(error, "unknown option \"%s\"", item->string);
     if (c->pending[0] == '*') return fail(error, "option \"%s\" is not in this version", c->key);
+    if (c->done[0] == '#') {
+        const double n = cJSON_IsNumber(item) ? item->valuedouble : 0;
+        if (!(n >= 4 && n <= 9007199254740992.0 && n == floor(n)))
+            return fail(error, "option \"%s\" must be an integer of 4 or more", c->key);
+        r->max_vertices = (int64_t)n;
+        return SQLITE_OK;
+    }
     if (!cJSON_IsString(item))
         return fail(error, "option \"%s\" must be a text: one of%.*s", c->key, (int)strlen(c->done) - 1, c->done);
     const char *value = item->valuestring;
@@ -46,15 +62,14 @@ static int read_one(const cJSON *item, store_query_options *options, char **erro
     if (!holds(c->done, value))
         return fail(error, "option \"%s\" has no value \"%s\"; this version knows%.*s", c->key, value,
                     (int)strlen(c->done) - 1, c->done);
-    if (strcmp(c->key, "select") == 0)
-        options->select = strcmp(value, "topdown") == 0    ? RQT_SELECT_TOP_DOWN
-                          : strcmp(value, "bottomup") == 0 ? RQT_SELECT_BOTTOM_UP
-                                                           : RQT_SELECT_THRESHOLD;
+    /* The lists above are in the order of the enumerations. */
+    if (strcmp(c->key, "select") == 0) r->options.select = (rqt_select)index_of(c, value);
+    if (strcmp(c->key, "metric") == 0) r->options.metric = (rqt_metric)index_of(c, value);
+    if (strcmp(c->key, "strip") == 0) r->fans = strcmp(value, "fan") == 0;
     return SQLITE_OK;
 }
 
-int options_read(const char *json, store_query_options *options, char **error) {
-    *options = (store_query_options){RQT_SELECT_THRESHOLD, RQT_OUTLINE_EXACT};
+int options_read(const char *json, request *r, char **error) {
     const char *end = NULL;
     cJSON *root = cJSON_ParseWithOpts(json, &end, true);
     if (!root) return fail(error, "options are not JSON, from here: %.40s", end ? end : json);
@@ -63,7 +78,7 @@ int options_read(const char *json, store_query_options *options, char **error) {
         for (const cJSON *other = item->next; other && code == SQLITE_OK; other = other->next)
             if (strcmp(item->string, other->string) == 0)
                 code = fail(error, "option \"%s\" is given twice", item->string);
-        if (code == SQLITE_OK) code = read_one(item, options, error);
+        if (code == SQLITE_OK) code = read_one(item, r, error);
     }
     cJSON_Delete(root);
     return code;

@@ -60,11 +60,12 @@ int request_read(connection *c, sqlite3_value *region, sqlite3_value *eps, sqlit
     memset(r, 0, sizeof *r);
     if (!request_number(eps, "eps", &r->eps, error)) return *error ? SQLITE_ERROR : SQLITE_NOMEM;
     if (r->eps < 0) return fail(error, "eps must be 0 or more; it is %!.15g", r->eps);
-    r->options = (store_query_options){RQT_SELECT_THRESHOLD, RQT_OUTLINE_EXACT};
+    r->options = (store_query_options){.select = RQT_SELECT_THRESHOLD, .outline = RQT_OUTLINE_EXACT};
+    r->achieved_eps = r->eps;
     int code = SQLITE_OK;
     if (options && sqlite3_value_type(options) != SQLITE_NULL) {
         const char *json = (const char *)sqlite3_value_text(options);
-        code = json ? options_read(json, &r->options, error) : SQLITE_NOMEM;
+        code = json ? options_read(json, r, error) : SQLITE_NOMEM;
     }
     if (code == SQLITE_OK) code = connection_store(c, &r->store, error);
     if (code == SQLITE_OK) r->connection = c;
@@ -74,8 +75,18 @@ int request_read(connection *c, sqlite3_value *region, sqlite3_value *eps, sqlit
     return code;
 }
 
-int request_patch(request *r, rqt_patch *patch, store_reads *reads, char **error) {
-    return store_query(r->store, r->terrain, r->region, r->eps, &r->options, patch, reads, error);
+int request_patch(request *r, rqt_product product, rqt_patch *patch, store_reads *reads, char **error) {
+    const bool fans = r->fans && product == RQT_PRODUCT_STRIP;
+    r->options.product = fans ? RQT_PRODUCT_TRIANGLES : product;
+    r->options.wants_leaves = fans;
+    int code = r->max_vertices == 0
+                   ? store_query(r->store, r->terrain, r->region, r->eps, &r->options, patch, reads, error)
+                   : store_query_within(r->store, r->terrain, r->region, r->eps, &r->options, r->max_vertices,
+                                        &r->achieved_eps, patch, reads, error);
+    if (code != SQLITE_OK || !fans) return code;
+    const rqt_status status = rqt_strip_build_fans(patch, store_allocator(), &patch->strip, &patch->strip_count);
+    patch->strip_capacity = patch->strip_count;
+    return status == RQT_OK ? SQLITE_OK : SQLITE_NOMEM;
 }
 
 void request_free(request *r) {

@@ -108,16 +108,13 @@ void call_circle(sqlite3_context *result, int count, sqlite3_value **arguments) 
 
 static int own_format(const request *r, const rqt_patch *patch, rqt_mesh_kind kind, uint8_t **bytes, size_t *size,
                       char **error) {
-    uint32_t *strip = NULL;
-    size_t indices = 3 * patch->triangle_count;
-    if (kind == RQT_MESH_STRIP && rqt_strip_build(patch, store_allocator(), &strip, &indices) != RQT_OK)
-        return SQLITE_NOMEM;
+    const bool strip = kind == RQT_MESH_STRIP;
     const rqt_mesh_header header = {.kind = kind,
                                     .vertex_count = patch->vertex_count,
-                                    .index_count = indices,
+                                    .index_count = strip ? patch->strip_count : 3 * patch->triangle_count,
                                     .placement = r->terrain->placement,
                                     .unit = r->terrain->unit,
-                                    .eps = r->eps,
+                                    .eps = r->achieved_eps,
                                     .srid = r->terrain->srid};
     *size = rqt_mesh_bytes(&header);
     int code = SQLITE_OK;
@@ -127,8 +124,7 @@ static int own_format(const request *r, const rqt_patch *patch, rqt_mesh_kind ki
         *bytes = sqlite3_malloc64(*size);
     if (code == SQLITE_OK && !*bytes) code = SQLITE_NOMEM;
     if (code == SQLITE_OK)
-        rqt_mesh_encode(&header, patch->vertices, kind == RQT_MESH_STRIP ? strip : patch->triangles, *bytes);
-    sqlite3_free(strip);
+        rqt_mesh_encode(&header, patch->vertices, strip ? patch->strip : patch->triangles, *bytes);
     return code;
 }
 
@@ -138,7 +134,7 @@ static int other_format(const request *r, const rqt_patch *patch, format_kind ki
                                 .unit = r->terrain->unit,
                                 .srid = r->terrain->srid,
                                 .title = r->terrain->name,
-                                .eps = r->eps};
+                                .eps = r->achieved_eps};
     const rqt_status status = format_patch(patch, &frame, kind, store_allocator(), bytes, size);
     if (status == RQT_OK) return SQLITE_OK;
     if (status == RQT_NO_MEMORY) return SQLITE_NOMEM;
@@ -156,20 +152,25 @@ void call_mesh(sqlite3_context *result, int count, sqlite3_value **arguments) {
     const char *format =
         sqlite3_value_type(arguments[2]) == SQLITE_TEXT ? (const char *)sqlite3_value_text(arguments[2]) : "";
     const bool strip = strcmp(format, "strip") == 0, indexed = strcmp(format, "indexed") == 0;
-    const bool other = !strip && !indexed && format_from_name(format, &kind);
+    const bool wire = strcmp(format, "rqt") == 0;
+    const bool other = !strip && !indexed && !wire && format_from_name(format, &kind);
     int code = SQLITE_OK;
-    if (strcmp(format, "rqt") == 0 || strcmp(format, "glb") == 0)
+    if (strcmp(format, "glb") == 0)
         code = fail(&error, "format \"%s\" is not in this version", format);
-    else if (!strip && !indexed && !other)
-        code = fail(&error, "unknown format \"%s\"; there are strip indexed obj ply wkb gpkg spatialite", format);
+    else if (!strip && !indexed && !wire && !other)
+        code =
+            fail(&error, "unknown format \"%s\"; there are strip indexed rqt obj ply wkb gpkg spatialite", format);
     if (code == SQLITE_OK)
         code = request_read(c, arguments[0], arguments[1], count > 3 ? arguments[3] : NULL,
                             count > 4 ? arguments[4] : NULL, &r, &error);
-    if (code == SQLITE_OK) code = request_patch(&r, &patch, NULL, &error);
-    if (code == SQLITE_OK)
+    if (code == SQLITE_OK && wire)
+        code = wire_mesh(&r, &bytes, &size, &error);
+    else if (code == SQLITE_OK)
+        code = request_patch(&r, strip ? RQT_PRODUCT_STRIP : RQT_PRODUCT_TRIANGLES, &patch, NULL, &error);
+    if (code == SQLITE_OK && !wire)
         code = other ? other_format(&r, &patch, kind, &bytes, &size, &error)
                      : own_format(&r, &patch, strip ? RQT_MESH_STRIP : RQT_MESH_INDEXED, &bytes, &size, &error);
-    rqt_patch_free(&patch);
+    if (r.store) store_keep(r.store, &patch);
     request_free(&r);
     if (code != SQLITE_OK)
         scalar_error(result, "rqt_mesh", code, error);

@@ -17,6 +17,7 @@ typedef struct proof {
     verify_report report;
     int64_t half_cells; /* valid ones of the whole raster; -1 when the region is less */
     double x, y;
+    double achieved_eps;
 } proof;
 
 static bool is_valid(const window *w, int32_t col, int32_t row) {
@@ -88,6 +89,9 @@ static void column(void *data, size_t row, int n, sqlite3_context *result) {
     case 12:
         sqlite3_result_int64(result, (sqlite3_int64)r->twice_area);
         break;
+    case 14:
+        sqlite3_result_double(result, p->achieved_eps);
+        break;
     default:
         if (p->half_cells >= 0) sqlite3_result_int64(result, p->half_cells);
         break;
@@ -129,8 +133,9 @@ static bool find_window(const request *r, const rqt_patch *patch, window *w) {
 
 static int prove(request *r, proof *p, char **error) {
     rqt_patch patch;
-    int code = request_patch(r, &patch, NULL, error);
+    int code = request_patch(r, RQT_PRODUCT_TRIANGLES, &patch, NULL, error);
     if (code != SQLITE_OK) return code;
+    p->achieved_eps = r->achieved_eps;
     window w;
     if (!find_window(r, &patch, &w)) return SQLITE_OK; /* outside the terrain: nothing is claimed */
     const sqlite3_uint64 samples = (sqlite3_uint64)w.width * (sqlite3_uint64)w.height;
@@ -167,7 +172,7 @@ static int prove(request *r, proof *p, char **error) {
     sqlite3_free(w.q);
     sqlite3_free(w.valid);
     sqlite3_free(triangles);
-    rqt_patch_free(&patch);
+    store_keep(r->store, &patch);
     return code;
 }
 

@@ -28,7 +28,7 @@ MUTANTS = [
      "test_core_codes", "eps_gives_up_the_quantum_error_and_rounds_down"),
     ("voids: an outline costs nothing", "src/core/error_tile.c", "if (ground > code) code = ground;", "(void)ground;",
      "test_core_lattice", "errors_equal_the_oracles_for_every_small_extent"),
-    ("voids: two valid corners are enough", "src/core/query.c",
+    ("voids: two valid corners are enough", "src/core/walk.c",
      "if (!(a->flags & b->flags & c->flags & RQT_VALID)) return false;",
      "if (!(a->flags & b->flags & RQT_VALID)) return false;",
      "test_core_query", "no_valid_sample_is_further_than_eps_and_exact_outlines_are_exact"),
@@ -54,6 +54,15 @@ MUTANTS = [
     ("closure: the diagonal of every cell the same", "src/core/lattice.c", ">> (scale + 1)) & 1) == 0;",
      ">> (scale + 1)) & 1) != 2;",
      "test_core_lattice", "parents_children_and_levels_equal_the_oracles_graph"),
+    # other metrics
+    ("minimal: one pass is enough", "src/core/minimal.c", "} while (f.changed);", "} while (0);",
+     "test_core_metric", "minimal_errors_select_what_splitting_bad_leaves_gives"),
+    ("minimal: a leaf that is not there is split", "src/core/minimal.c", "least(f->deviation[2 * at], apex0)", "f->deviation[2 * at]",
+     "test_core_metric", "no_mesh_of_5_by_5_is_smaller_or_nearer_within_its_size"),
+    ("wedgie: no bound at the raster's edge", "src/core/metric.c", "nested > least ? nested : least", "nested + 0 * least",
+     "test_core_metric", "local_wedgie_and_euclid_are_their_definitions"),
+    ("fans: a clockwise run begins where others do", "src/core/strip_fans.c", "(odd ? 1u : 0u)", "(0u * odd)",
+     "test_core_fans", "every_metric_answers_alike_by_all_ways_and_blocks"),
     # the sweep
     ("sweep: tiles do not hear of each other", "src/core/sweep.c",
      "raise_to(code, sweep->right_code[right + y]);", "(void)code;",
@@ -77,13 +86,31 @@ MUTANTS = [
     ("walk: a shared quarter never", "src/core/query.c",
      "if (sibling < answer->number && has_answer(w, sibling)) continue;", "if (has_answer(w, sibling)) continue;",
      "test_core_query", "queries_equal_the_global_walk_on_small_rasters"),
-    ("walk: every half is walked", "src/core/query.c", "if (is_selected(w, at, apex->error, apex->flags)) {", "if (true) {",
+    ("walk: every half is walked", "src/core/query.c", "if (is_selected(w, apex.at, apex.error, apex.flags)) {", "if (true) {",
      "test_core_query", "queries_equal_the_global_walk_on_small_rasters"),
+    ("walk: quarters of blocks that only touch are lost", "src/core/query.c",
+     "/* center: the corner that is the parent's centre; c: the one opposite, a corner of the parent. */",
+     "if (outside) return;",
+     "test_core_query", "queries_equal_the_global_walk_on_small_rasters"),
+    ("walk: blocks that only touch are read", "src/core/query.c", "if (!outside && rqt_summary_needs_block(",
+     "if (rqt_summary_needs_block(", "test_core_strip", "blocks_that_only_touch_the_region_are_not_read"),
+    ("walk: what the border adds is forgotten", "src/core/patch.c",
+     "if (memo < w->live || memo >= KNOWN) continue;", "if (true) continue;",
+     "test_core_query", "queries_equal_the_global_walk_on_larger_rasters"),
+    ("walk: what earlier blocks left in the memo counts", "src/core/walk.c", "const bool fresh = left < live;",
+     "const bool fresh = left == 0;", "test_core_query", "queries_equal_the_global_walk_on_larger_rasters"),
+    ("strip: the pivot is not said again", "src/core/walk.c", "s += pivot == through;", "",
+     "test_core_strip", "every_product_is_the_same_patch"),
+    ("height: a leaf with a void corner", "src/core/leaf.c",
+     "if (!(a->flags & l->flags & r->flags & RQT_VALID)) return RQT_FOUND_NOTHING;", "",
+     "test_store", "a_height_is_the_one_of_the_patch_of_the_point"),
+    ("height: the finest triangles do not split", "src/core/leaf.c", "splits > 0; splits--", "splits > 1; splits--",
+     "test_store", "a_height_is_the_one_of_the_patch_of_the_point"),
     # the winding
-    ("winding: strips do not turn", "src/core/strip.c", "s[count++] = even ? b : c;\n        s[count++] = even ? c : b;",
-     "s[count++] = b;\n        s[count++] = c;", "test_core_strip", "strips_of_patches_are_the_patches"),
-    ("winding: triangles do not turn with depth", "src/core/query.c",
-     "walk_plain(w, m, l, a, splits - 1, !clockwise);", "walk_plain(w, m, l, a, splits - 1, clockwise);",
+    ("winding: strips do not turn", "src/core/strip.c", "s[count++] = even ? b : c;\n    s[count++] = even ? c : b;",
+     "s[count++] = b;\n    s[count++] = c;", "test_core_strip", "strips_of_patches_are_the_patches"),
+    ("winding: triangles do not turn with depth", "src/core/walk.c",
+     "swap = (l ^ r) & (0 - (turn ^ (c.splits & 1)));", "swap = (l ^ r) & (0 - turn);",
      "test_core_query", "queries_equal_the_global_walk_on_small_rasters"),
     # regions
     ("region: coordinates cut off instead of rounded", "src/core/region.c", "return (int64_t)rint(units);",
@@ -127,6 +154,16 @@ MUTANTS = [
     ("import: decimals tried from zero only", "src/import/quantise.c", "if (z0 == t->steps.z0) return true;",
      "if (z0 == t->steps.z0 || z0 > 0) return true;",
      "test_import_stream", "every_way_gives_the_same_tables_of_decimals"),
+    # the wire format
+    ("wire: a guess stays where a height was sent", "src/core/wire_steps.h",
+     "        settle(w, m, false);\n        return true;", "        return true;",
+     "test_wire", "the_patch_of_the_query_comes_back_in_its_order"),
+    ("wire: an increment of any mesh is taken", "src/core/wire_decode.c",
+     "if (rqt_wire_digest(patch) != from)", "if (from == 0)",
+     "test_wire", "increments_that_belong_elsewhere_are_refused_with_a_reason"),
+    ("wire: heights beyond the limit", "src/core/wire_decode.c",
+     "if (q > -RQT_HEIGHT_LIMIT && q < RQT_HEIGHT_LIMIT)", "if (q != INT64_MIN)",
+     "test_wire", "hostile_bytes_are_refused_or_harmless"),
 ]
 
 
@@ -140,7 +177,7 @@ def main():
         (shutil.copytree if os.path.isdir(name) else shutil.copy2)(name, os.path.join(tree, name))
     # Objects are up to date with the sources they came from: times are kept.
     shutil.copytree(build, os.path.join(tree, "build"),
-                    ignore=shutil.ignore_patterns("mutants", "sanitized", "bench", "demo", "*.log"))
+                    ignore=shutil.ignore_patterns("mutants", "sanitized", "bench", "chart", "peers", "demo", "*.log"))
     environment = dict(os.environ, RQT_SEED="1", TMPDIR=os.path.abspath(tree))
     caught = missed = 0
     for what, path, old, new, program, test in MUTANTS:

@@ -62,7 +62,7 @@ printf 'not a raster\n' >text.txt
 # -------------------------------------------------------------------------------------------------- help, usage
 prints "rqt --help" "Commands:" --help
 prints "rqt --version" "rqt 0." --version
-for c in import info check verify mesh; do
+for c in import info check verify mesh chart; do
     prints "rqt --help lists $c" "  $c " --help
     prints "rqt $c --help has examples" "Examples:" $c --help
     n=$(sed -n '/^Examples:/,$p' out | grep -c "^  rqt $c")
@@ -76,12 +76,11 @@ done
 refuses "no command" 2 "a command is missing"
 refuses "unknown command" 2 "there is no command dance" dance
 refuses "unknown option before a command" 2 "there is no option --dance" --dance
-for c in update serve chart; do refuses "rqt $c is for later" 2 "not in this version" $c x; done
+for c in update serve; do refuses "rqt $c is for later" 2 "not in this version" $c x; done
 
 # ------------------------------------------------------------------------------------------------------- import
 refuses "import: nothing" 2 "a source and a database are missing" import
 refuses "import: no database" 2 "the database is missing" import hill.asc
-refuses "import: --minimal is for later" 2 "--minimal is not in this version" import --minimal hill.asc x.gpkg
 refuses "import: --block 9" 2 "--block 9: K is a whole number from 1 to 8" import --block 9 hill.asc x.gpkg
 refuses "import: --block 5x" 2 "--block 5x" import --block 5x hill.asc x.gpkg
 refuses "import: --block without a value" 2 "the option --block needs a value" import hill.asc x.gpkg --block
@@ -297,6 +296,98 @@ if [ -w /dev/full ]; then
     "$RQT" info t.gpkg >/dev/full 2>err; [ $? = 1 ] && grep -q 'stdout' err; ok "a full disk under stdout is a failure" $? "$(cat err)"
 fi
 [ -z "$(ls -A | grep '\.part-')" ]; ok "no temporary file is left" $?
+
+# ----------------------------------------------------------------------------------------------------------- chart
+C="chart t.gpkg --terrain hill"
+refuses "chart: no database" 2 "a database is missing" chart -o c
+refuses "chart: no folder" 2 "-o is missing" $C
+refuses "chart: a file as folder" 2 "is not a folder" $C -o hill.asc
+refuses "chart: a folder in a folder that is not there" 1 "cannot be made" $C -o nowhere/c
+refuses "chart: a bad eps" 2 "is no tolerance" $C -o c --eps x
+refuses "chart: a bad --at" 2 "--at -1 is no tolerance" $C -o c --at -1
+refuses "chart: a bad number of runs" 2 "--runs 0 is no number from 1 to 99" $C -o c --runs 0
+for m in best exact/ /topdown exact,,local exactly exact/fan ''; do
+    refuses "chart: --methods '$m'" 2 "there is no method" $C -o c --methods "$m"
+done
+refuses "chart: a method twice" 2 "exact is given twice" $C -o c --methods exact,local,exact/threshold
+[ ! -e c ]; ok "refused charts make no folder" $?
+refuses "chart: two terrains and no name" 1 "my.hole-2" chart t.gpkg -o c
+refuses "chart: an unknown terrain" 1 "nobody" chart t.gpkg -o c --terrain nobody
+refuses "chart: a region outside" 1 "holds no sample of hill" $C -o c --region 0,0,1,1 --runs 1
+refuses "chart: an unreadable region" 1 "no method could be measured" $C -o c --region 'CIRCLE(1)'
+refuses "chart: damaged blocks" 1 "rqt chart: " chart broken.gpkg --terrain hill -o c --eps 0
+refuses "chart: peers that are not there" 1 "nowhere.csv" $C -o c --runs 1 --eps 5 --methods exact --peers nowhere.csv
+# The same figures as SQL's, in the order of eps, equal ones once; nothing on stdout.
+mkdir nothing # a PATH without gnuplot
+PATH=$PWD/nothing rqt $C -o c --eps 5,1,20,5 --runs 1 --methods exact,exact/topdown
+[ $status = 0 ] && [ ! -s out ] && grep -q 'pictures need gnuplot' err && grep -q 'no meshes of peers' err &&
+    [ "$(grep -c 'need gnuplot' err)" = 1 ] && [ -z "$(ls c | grep -v 'csv$\|gp$')" ]
+ok "chart without gnuplot: CSV, one sentence, status 0" $? "$status $(cat out err; ls c)"
+want="series,eps,max_error,rms_error,vertices,triangles
+$(sql -csv t.gpkg "SELECT m.value, e.value, 1.0 * max_error, rms_error, vertices, triangles FROM json_each('[\"exact\",\"exact/topdown\"]') m,
+     json_each('[1,5,20]') e, rqt_verify(NULL, e.value, 'hill') ORDER BY m.key, e.key" | tr -d '\r"')"
+rounded() { awk -F, -v OFS=, 'NR > 1 { $3 = sprintf("%.9g", $3); $4 = sprintf("%.9g", $4) } { print }'; }
+[ "$(rounded <c/1-error-vertices.csv)" = "$(rounded <<<"$want")" ]
+ok "chart 1 has rqt_verify's numbers" $? "$(diff <(rounded <c/1-error-vertices.csv) <(rounded <<<"$want"))"
+rqt import --block 3 --name hill hill.asc small.gpkg
+rqt chart small.gpkg -o small --runs 1 --eps 5 --methods exact
+bytes=$(sql small.gpkg "SELECT count(*) || ',' || sum(bytes) FROM rqt_explain(NULL, 5, 'hill')")
+[ "$(awk -F, '$1 == "exact" { print $7 "," $8 }' small/3-time-error.csv)" = "$bytes" ] && [ "${bytes%,*}" -gt 10 ]
+ok "chart 3 has rqt_explain's bytes" $? "$bytes; $(cat small/3-time-error.csv)"
+awk -F, 'NR == 1 { for (i = 1; i <= NF; i++) at[$i] = i; next } { n++; if (!($at["ms"] > 0 && $at["fresh_ms"] > 0 && $at["fresh_bytes"] > 0 && $at["runs"] == 1)) bad++ }
+    END { exit !(n == 6 && !bad) }' c/rows.csv
+ok "rows.csv has times and bytes" $? "$(cat c/rows.csv)"
+# The front, worked out again.
+awk -F, 'NR > 1 { ms[NR] = $3; e[NR] = $4; v[NR] = $5; front[NR] = $6; last = NR }
+    END { for (i = 2; i <= last; i++) { best = 1
+              for (j = 2; j <= last; j++) if (ms[j] <= ms[i] && e[j] <= e[i] && v[j] <= v[i] && (ms[j] < ms[i] || e[j] < e[i] || v[j] < v[i])) best = 0
+              if (best != front[i]) wrong++ } exit wrong > 0 || last != 7 }' c/4-front.csv
+ok "chart 4's front is what nothing beats" $? "$(cat c/4-front.csv)"
+# Peers: rows of the same samples are added, others are not.
+head='series,asked,max_error,rms_error,samples,vertices,triangles,ms'
+printf '%s\nTIN,5,4.5,1.25,3500,40,60,0.5\nTIN,5,4.5,1.25,3501,40,60,0.5\n' "$head" >peers.csv
+rqt $C -o c --eps 5 --runs 1 --methods exact --peers peers.csv
+[ $status = 0 ] && grep -q 'meshes of 3 501 samples, and here are 3 500' err &&
+    [ "$(grep -c '^TIN,' c/1-error-vertices.csv)" = 1 ] && grep -qx 'TIN,5,4.5,1.25,40,60' c/1-error-vertices.csv
+ok "chart: peers of the same samples are in it" $? "$status $(cat err c/1-error-vertices.csv)"
+printf '%s\nlarge,5,0.01,0.01,3500,9999,9999,0\n' "$head" >peers.csv
+rqt $C -o c --eps 5 --runs 1 --methods exact --peers peers.csv
+[ "$(cut -d, -f1,6 c/4-front.csv | tr '\n' ' ')" = "series,front exact,1 large,1 " ]; ok "chart 4: fewer vertices are on the front" $? "$(cat c/4-front.csv)"
+printf '%s\nbest,5,0.01,0.01,3500,9,9,0\n' "$head" >peers.csv
+rqt $C -o c --eps 5 --runs 1 --methods exact --peers peers.csv
+[ "$(cut -d, -f1,6 c/4-front.csv | tr '\n' ' ')" = "series,front exact,0 best,1 " ]; ok "chart 4: what is worse in all is not" $? "$(cat c/4-front.csv)"
+for row in 'TIN,5,4.5,1.25,3500,40,60' 'TIN,5,4.5,1.25,3500,40,60,0.5,1' 'TIN,x,4.5,1.25,3500,40,60,0.5' ',5,4.5,1.25,3500,40,60,0.5' \
+    'TIN,5,-1,1.25,3500,40,60,0.5' "T'IN,5,4.5,1.25,3500,40,60,0.5"; do
+    printf '%s\n%s\n' "$head" "$row" >peers.csv
+    refuses "chart: peers' row $row" 1 "line 2 is no row of a peer" $C -o c --eps 5 --runs 1 --methods exact --peers peers.csv
+done
+echo 'a,b' >peers.csv; refuses "chart: a file of something else" 1 "is no file of peers" $C -o c --eps 5 --runs 1 --methods exact --peers peers.csv
+# Families: charts 5 and 6 alone, members in the order of their numbers.
+for i in 2 0.5 10; do rqt import --name "h_noise_$i" hill.asc f.gpkg; done
+for i in 9 70; do rqt import --name "h_size_$i" hill.asc f.gpkg; done
+rqt chart f.gpkg -o f --runs 1 --at 3 --methods exact,exact/bottomup
+[ $status = 0 ] && grep -q 'charts 1 to 4 are left out' err && [ ! -e f/1-error-vertices.csv ]
+ok "chart of families only" $? "$status $(cat err; ls f)"
+[ "$(cut -d, -f1-4 f/5-noise.csv | tail -n +2 | tr '\n' ' ')" = "exact,h_noise_0.5,0.5,3 exact,h_noise_2,2,3 exact,h_noise_10,10,3 " ]
+ok "chart 5 has a row for each noise" $? "$(cat f/5-noise.csv)"
+want=$(sql f.gpkg "SELECT vertices FROM rqt_verify(rqt_bbox(1177.5, 2127.5, 1522.5, 2372.5), 3, 'h_size_9')")
+[ "$(cut -d, -f5 f/6-size.csv | tail -n +2 | sort -u)" = "$want" ] && [ "$(grep -c h_size f/6-size.csv)" = 2 ]
+ok "chart 6 is of the middle of what all have" $? "$want; $(cat f/6-size.csv)"
+rqt import --name other hill.asc f.gpkg
+rqt chart f.gpkg -o f --runs 1 --eps 3 --methods exact
+[ $status = 0 ] && grep -q '^exact,3,' f/1-error-vertices.csv; ok "chart: the only terrain outside families is the one" $? "$status $(cat err)"
+if command -v gnuplot >/dev/null; then
+    [ ! -s out ] && ! grep -qvE '^rqt chart: ' err
+    ok "gnuplot has nothing to say" $? "$(cat err)"
+    for name in 1-error-vertices 2-error-eps 3-time-error 4-front 5-noise 6-size; do
+        read -r w h <<<"$(size_of f/$name.png)"
+        [ "$w" -ge 1100 ] && [ "$h" = 704 ] && tail -c 8 f/$name.svg | grep -q '</svg>'; ok "chart: $name.png and .svg" $? "$w x $h"
+    done
+fi
+printf 'ncols 5\nnrows 5\nxllcorner 0\nyllcorner 0\ncellsize 1\n%s' "$(for i in 1 2 3 4 5; do echo 7 7 7 7 7; done)" >flat.asc
+rqt import flat.asc flat.gpkg
+rqt chart flat.gpkg -o flat --runs 1; [ $status = 0 ] && [ "$(grep -c 'no mesh has an error' err)" = 4 ] && [ -s flat/1-error-vertices.csv ]
+ok "chart of a flat terrain: CSV, no pictures" $? "$status $(cat err)"
 
 # ------------------------------------------------------------------------------------------------- read-only, locked
 if [ "$(id -u)" != 0 ]; then

@@ -127,8 +127,9 @@ static inline size_t database_answers(const database *d, const rqt_region *regio
     return count;
 }
 
-static inline rqt_status database_query(database *d, const rqt_region *region, rqt_code eps, rqt_select select,
-                                        rqt_outline outline, const rqt_allocator *allocator, rqt_patch *patch) {
+static inline rqt_status database_query_as(database *d, const rqt_region *region, rqt_code eps, rqt_select select,
+                                           rqt_outline outline, rqt_product product, bool leaves,
+                                           rqt_scratch *scratch, const rqt_allocator *allocator, rqt_patch *patch) {
     rqt_answer *answers = calloc(d->count ? d->count : 1, sizeof *answers);
     if (!answers) abort();
     rqt_query query = {.lattice = d->lattice,
@@ -137,6 +138,9 @@ static inline rqt_status database_query(database *d, const rqt_region *region, r
                        .eps = eps,
                        .select = select,
                        .outline = outline,
+                       .product = product,
+                       .wants_leaves = leaves,
+                       .scratch = scratch,
                        .answers = answers,
                        .answer_count = database_answers(d, region, eps, outline, answers),
                        .read_block = database_read,
@@ -146,6 +150,11 @@ static inline rqt_status database_query(database *d, const rqt_region *region, r
     d->asking = NULL;
     free(answers);
     return status;
+}
+
+static inline rqt_status database_query(database *d, const rqt_region *region, rqt_code eps, rqt_select select,
+                                        rqt_outline outline, const rqt_allocator *allocator, rqt_patch *patch) {
+    return database_query_as(d, region, eps, select, outline, RQT_PRODUCT_TRIANGLES, false, NULL, allocator, patch);
 }
 
 /* Legal block sizes of a terrain: 0 only where nothing else fits. */

@@ -14,15 +14,18 @@ static bool has_area(const model *m, int x, int y) {
     return reach == 1 << m->grid.lattice.K || (x - reach < m->r.width - 1 && y - reach < m->r.height - 1);
 }
 
+/* A vertex without area, past the raster, may err anything up to its true number: nobody asks. */
 static void check_vertex(const model *m, int x, int y, int32_t q, rqt_code error, uint8_t flags, const char *what) {
     const oracle_point at = {x, y}, sample = oracle_clamp(&m->o, at);
     const oracle_node *n = oracle_at(&m->o, x, y);
     int valid = oracle_is_valid(&m->o, at), counts = has_area(m, x, y);
-    int right = (valid ? RQT_VALID : 0) | (counts && n->outline ? RQT_OUTLINE : 0);
-    unsigned code = counts ? n->code : 0;
-    if (flags != right || error != code) raster_print(&m->r);
-    CHECK(flags == right, "%s (%d,%d): flags %d, should be %d", what, x, y, flags, right);
-    CHECK(error == code, "%s (%d,%d): error %u, should be %u", what, x, y, error, code);
+    int right = (valid ? RQT_VALID : 0) | (n->outline ? RQT_OUTLINE : 0),
+        least = counts ? right : right & RQT_VALID;
+    if (error > n->code || (counts && error != n->code)) raster_print(&m->r);
+    CHECK((flags & ~right) == 0 && (flags & least) == least, "%s (%d,%d): flags %d, should be %d", what, x, y,
+          flags, right);
+    CHECK(error <= n->code && (!counts || error == n->code), "%s (%d,%d): error %u, should be %u", what, x, y,
+          error, n->code);
     if (valid) CHECK(q == m->r.q[sample.y * m->r.width + sample.x], "%s (%d,%d): height %d", what, x, y, (int)q);
 }
 
@@ -94,6 +97,7 @@ static void check_block(const model *m, int k, const rqt_block_place *p, const r
             const int x = p->x + u * p->stride, y = p->y + v * p->stride, at = v * n + u;
             const oracle_node *node = oracle_at(&m->o, x, y);
             const bool corner = u % last == 0 && v % last == 0;
+            if (decoded && p->stride > 1 && !corner && !has_area(m, x, y)) continue;
             if (!decoded || p->stride == 1 || corner || node->outline || node->code > tol.em)
                 check_vertex(m, x, y, b->q[at], b->error[at], b->flags[at], what);
             else

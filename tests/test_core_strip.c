@@ -46,7 +46,11 @@ static void bare_triangles_in_any_order_make_a_strip(void **state) {
     random_begin("bare triangles");
     rqt_patch_vertex vertices[60] = {0};
     uint32_t triangles[3 * 50] = {0, 1, 2};
-    rqt_patch p = {vertices, 3, triangles, 1, NULL, test_allocator};
+    rqt_patch p = {.vertices = vertices,
+                   .vertex_count = 3,
+                   .triangles = triangles,
+                   .triangle_count = 1,
+                   .allocator = test_allocator};
     size_t n;
     check_strip(&p, &n);
     assert_int_equal(n, 3);
@@ -98,6 +102,113 @@ static void strips_of_patches_are_the_patches(void **state) {
     }
 }
 
+/* The same query in every way that it can be asked: with the leaves, which takes the careful walk throughout, and
+ * as triangles, strip or vertices alone, with memory of its own and with what the last query left. The triangles
+ * are the same in the same order, turned alike; the strip is the one that is made of the triangles; each vertex is
+ * there once, with the same error and level. */
+static void check_products(database *d, const rqt_region *region, rqt_code eps, rqt_select select,
+                           rqt_outline outline, rqt_scratch *scratch) {
+    rqt_patch careful;
+    assert_int_equal(database_query_as(d, region, eps, select, outline, RQT_PRODUCT_TRIANGLES, true, NULL,
+                                       &test_allocator, &careful),
+                     RQT_OK);
+    for (int way = 0; way < 6; way++) {
+        const rqt_product product = (rqt_product)(way % 3);
+        rqt_patch p;
+        assert_int_equal(database_query_as(d, region, eps, select, outline, product, false,
+                                           way < 3 ? NULL : scratch, &test_allocator, &p),
+                         RQT_OK);
+        assert_int_equal(p.vertex_count, careful.vertex_count);
+        assert_int_equal(p.triangle_count, careful.triangle_count);
+        assert_true((product == RQT_PRODUCT_TRIANGLES || !p.triangles) &&
+                    (product == RQT_PRODUCT_STRIP || !p.strip));
+        assert_null(p.leaves);
+        if (product == RQT_PRODUCT_TRIANGLES)
+            for (size_t i = 0; i < 3 * p.triangle_count; i++) {
+                assert_true(p.triangles[i] < p.vertex_count);
+                const rqt_patch_vertex *a = &p.vertices[p.triangles[i]],
+                                       *b = &careful.vertices[careful.triangles[i]];
+                CHECK(a->col == b->col && a->row == b->row && a->q == b->q && a->error == b->error &&
+                          a->level == b->level,
+                      "corner %zu of triangle %zu is (%d,%d), not (%d,%d)", i % 3, i / 3, a->col, a->row, b->col,
+                      b->row);
+            }
+        if (product == RQT_PRODUCT_STRIP) {
+            rqt_patch list;
+            uint32_t *strip;
+            size_t n;
+            assert_int_equal(database_query_as(d, region, eps, select, outline, RQT_PRODUCT_TRIANGLES, false, NULL,
+                                               &test_allocator, &list),
+                             RQT_OK);
+            assert_int_equal(rqt_strip_build(&list, &test_allocator, &strip, &n), RQT_OK);
+            assert_int_equal(n, p.strip_count);
+            if (n) assert_memory_equal(strip, p.strip, n * sizeof *strip);
+            for (size_t v = 0; v < p.vertex_count; v++)
+                assert_memory_equal(&list.vertices[v].col, &p.vertices[v].col, 2 * sizeof(int32_t));
+            (void)test_allocator.resize(test_allocator.context, strip, 0);
+            rqt_patch_free(&list);
+        }
+        if (way < 3)
+            rqt_patch_free(&p);
+        else
+            rqt_scratch_keep(scratch, &p, way == 4 ? 0 : 1 << 20);
+    }
+    rqt_patch_free(&careful);
+}
+
+static void every_product_is_the_same_patch(void **state) {
+    (void)state;
+    random_begin("products");
+    rqt_scratch *scratch;
+    assert_int_equal(rqt_scratch_create(&test_allocator, &scratch), RQT_OK);
+    for (int round = 0; round < 100; round++) {
+        model m;
+        database d;
+        const int most = round % 10 == 0 ? 70 : 40;
+        raster r = raster_make((surface)random_between(0, SURFACE_COUNT - 1), random_between(2, most),
+                               random_between(2, most), round % 2 ? -1 : random_between(0, 8));
+        if (round % 5 == 1) raster_add_lake(&r);
+        model_create(&m, r);
+        assert_int_equal(
+            database_create(&d, &m, random_between(smallest_k(&m.grid.lattice), m.grid.lattice.K), &test_allocator),
+            RQT_OK);
+        for (int w = 0; w < 8; w++) {
+            window in =
+                w < 2 ? window_all() : random_window(m.r.width, m.r.height, random_between(0, WINDOW_KINDS - 1));
+            rqt_region *region = region_of(&in, &m.grid.lattice);
+            unsigned code = oracle_at(&m.o, random_between(0, m.o.side - 1), random_between(0, m.o.side - 1))->code;
+            rqt_code eps = w % 4 == 0 || code > RQT_CODE_LARGEST ? 0 : (rqt_code)code;
+            check_products(&d, region, eps, (rqt_select)(w % 5 == 4 ? 1 : 0), (rqt_outline)(w % 2), scratch);
+            rqt_region_free(region);
+        }
+        database_free(&d, &test_allocator);
+        model_free(&m);
+    }
+    rqt_scratch_free(scratch);
+}
+
+/* A window that ends on the border between two blocks has nothing of the one behind it. */
+static void blocks_that_only_touch_the_region_are_not_read(void **state) {
+    (void)state;
+    random_begin("touching");
+    model m;
+    database d;
+    model_create(&m, raster_make(SURFACE_NOISE, 65, 65, -1));
+    assert_int_equal(database_create(&d, &m, 3, &test_allocator), RQT_OK);
+    const long inner[4] = {16 * ORACLE_UNITS, 16 * ORACLE_UNITS, 32 * ORACLE_UNITS, 40 * ORACLE_UNITS};
+    window in = window_of(inner);
+    rqt_region *region = region_of(&in, &m.grid.lattice);
+    rqt_patch patch;
+    assert_int_equal(
+        database_query(&d, region, 0, RQT_SELECT_THRESHOLD, RQT_OUTLINE_EXACT, &test_allocator, &patch), RQT_OK);
+    assert_true(patch.triangle_count > 16 * 24); /* all of 2 * 16 * 24 but where the noise is flat */
+    assert_int_equal(d.reads, 2 * 3);
+    rqt_patch_free(&patch);
+    rqt_region_free(region);
+    database_free(&d, &test_allocator);
+    model_free(&m);
+}
+
 static void a_full_mesh_costs_less_than_one_and_three_quarter_indices_a_triangle(void **state) {
     (void)state;
     random_begin("strip length");
@@ -146,6 +257,8 @@ int main(void) {
         TEST(an_empty_patch_is_an_empty_strip),
         TEST(bare_triangles_in_any_order_make_a_strip),
         TEST(strips_of_patches_are_the_patches),
+        TEST(every_product_is_the_same_patch),
+        TEST(blocks_that_only_touch_the_region_are_not_read),
         TEST(a_full_mesh_costs_less_than_one_and_three_quarter_indices_a_triangle),
     };
     return cmocka_run_group_tests_name("strips", tests, NULL, NULL);

@@ -25,7 +25,8 @@ static void test_obj_text(void **state) {
     uint32_t indices[] = {0, 1, 2};
     heap h = {0};
     rqt_allocator allocator = {heap_resize, &h};
-    rqt_patch patch = {vertices, 3, indices, 1, NULL, allocator};
+    rqt_patch patch = {
+        .vertices = vertices, .vertex_count = 3, .triangles = indices, .triangle_count = 1, .allocator = allocator};
     format_frame frame = {{600000.5, 200000, 0.25, -0.5}, {400, 100, 1, 1, 1, 0}, 21781, "a\nv 1 2 3", 0.5};
     uint8_t *bytes;
     size_t size;

@@ -10,7 +10,7 @@ static size_t selected(const char *database, double eps) {
     rqt_region *region = NULL;
     rqt_patch patch;
     char *error = NULL;
-    store_query_options how = {RQT_SELECT_THRESHOLD, RQT_OUTLINE_EXACT};
+    store_query_options how = {.select = RQT_SELECT_THRESHOLD, .outline = RQT_OUTLINE_EXACT};
     assert_int_equal(rqt_region_create(NULL, &r.t->placement, &r.t->lattice, store_allocator(), &region), RQT_OK);
     if (store_query(r.store, r.t, region, eps, &how, &patch, NULL, &error)) fail_msg("%s", error);
     size_t n = patch.vertex_count;

@@ -25,6 +25,7 @@ SCALARS = {  # argument counts, deterministic
     "rqt_height": ([2, 3, 4], False),
     "rqt_bbox": ([4, 5], True),
     "rqt_circle": ([3], True),
+    "rqt_delta": ([3, 4], False),
     "rqt_block_info": ([1], True),
     "rqt_block_check": ([1], True),
     "rqt_block_dump": ([1], True),

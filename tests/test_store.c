@@ -552,6 +552,70 @@ static void heights_are_the_planes_of_the_full_raster_or_of_the_mesh(void **stat
     }
 }
 
+/* The height that the patch of the point gives: in its first triangle. */
+static bool height_by_patch(const probe *p, double x, double y, double eps, double *metres) {
+    char text[128];
+    rqt_geometry *geometry = NULL;
+    rqt_region *region = NULL;
+    rqt_message why;
+    rqt_patch patch;
+    (void)snprintf(text, sizeof text, "POINT(%.17g %.17g)", x, y);
+    assert_int_equal(rqt_geometry_parse(text, strlen(text), true, store_allocator(), &geometry, &why), RQT_OK);
+    assert_int_equal(rqt_region_create(geometry, &p->t->placement, &p->t->lattice, store_allocator(), &region),
+                     RQT_OK);
+    assert_int_equal(store_query(p->s, p->t, region, eps, &by_threshold, &patch, NULL, NULL), SQLITE_OK);
+    const bool found = patch.triangle_count > 0;
+    if (found) {
+        const rqt_patch_vertex *a = &patch.vertices[patch.triangles[0]], *b = &patch.vertices[patch.triangles[1]],
+                               *c = &patch.vertices[patch.triangles[2]];
+        const double col = nearbyint((x - p->t->placement.x0) / p->t->placement.dx * 0x1p20) * 0x1p-20,
+                     row = nearbyint((y - p->t->placement.y0) / p->t->placement.dy * 0x1p20) * 0x1p-20;
+        const double area =
+            (double)(b->col - a->col) * (c->row - a->row) - (double)(c->col - a->col) * (b->row - a->row);
+        const double wb = ((col - a->col) * (c->row - a->row) - (c->col - a->col) * (row - a->row)) / area;
+        const double wc = ((b->col - a->col) * (row - a->row) - (col - a->col) * (b->row - a->row)) / area;
+        const double q = a->q + wb * ((double)b->q - a->q) + wc * ((double)c->q - a->q);
+        *metres = ((double)test_unit.z0 + q / (double)test_unit.d) * rqt_unit_factor(&test_unit) + test_unit.offset;
+    }
+    rqt_patch_free(&patch);
+    rqt_region_free(region);
+    rqt_geometry_free(geometry);
+    return found;
+}
+
+/* Straight down to the leaf or through the patch of the point: the same bits. */
+static void a_height_is_the_one_of_the_patch_of_the_point(void **state) {
+    (void)state;
+    static const struct {
+        int width, height, k;
+    } sizes[] = {{33, 33, 2}, {65, 65, 3}, {40, 29, 3}, {18, 33, 1}, {9, 9, 3}, {2, 2, 0}};
+    static const double eps[] = {0, 1, 4, 6, 8, 10, 12, 16, 100, INFINITY};
+    for (size_t n = 0; n < 2 * sizeof sizes / sizeof *sizes; n++) {
+        const int w = sizes[n / 2].width, h = sizes[n / 2].height;
+        sqlite3 *db = memory_terrain(w, h, sizes[n / 2].k, n % 2);
+        probe p = {0};
+        assert_int_equal(store_open(db, &p.s), SQLITE_OK);
+        assert_int_equal(store_find(p.s, "t", &p.t, NULL), SQLITE_OK);
+        for (uint32_t i = 0; i < 4000; i++) {
+            /* anywhere, on halves and on eighths of a sample, where edges are, and a hair beside them */
+            double col = noise(i, 1, 5) * 0x1p-32 * (w - 1), row = noise(i, 2, 5) * 0x1p-32 * (h - 1);
+            const double grain = i % 4 == 1 ? 2 : i % 4 == 2 ? 8 : 1;
+            if (i % 4) col = floor(col * grain + 0.5) / grain, row = floor(row * grain + 0.5) / grain;
+            if (i % 8 == 3) col += (noise(i, 3, 5) % 3 - 1.0) * 0x1p-20;
+            const double x = 1000 + 10 * col, y = 2000 - 10 * row, e = eps[noise(i, 4, 5) % 10];
+            double got = 0, wanted = 0;
+            bool found = false;
+            assert_int_equal(store_height(p.s, p.t, x, y, e, &got, &found, NULL), SQLITE_OK);
+            const bool right = height_by_patch(&p, x, y, e, &wanted);
+            CHECK(found == right && (!found || memcmp(&got, &wanted, sizeof got) == 0),
+                  "%d x %d, k %d, (%.9g,%.9g) at %g: %d %.17g, not %d %.17g", w, h, sizes[n / 2].k, col, row, e,
+                  found, got, right, wanted);
+        }
+        store_close(p.s);
+        sqlite3_close(db);
+    }
+}
+
 static void rasters_of_one_row_or_column_have_heights_and_no_mesh(void **state) {
     (void)state;
     for (int tall = 0; tall < 2; tall++) {
@@ -591,7 +655,8 @@ static void every_way_of_selecting_gives_one_mesh_and_reads_tell_which_blocks(vo
     for (int n = 0; n < 5; n++) {
         for (int outline = 0; outline < 2; outline++) {
             store_reads reads;
-            store_query_options options = {RQT_SELECT_THRESHOLD, outline ? RQT_OUTLINE_TOL : RQT_OUTLINE_EXACT};
+            store_query_options options = {.select = RQT_SELECT_THRESHOLD,
+                                           .outline = outline ? RQT_OUTLINE_TOL : RQT_OUTLINE_EXACT};
             const answer a = query_store(s, "t", eps[n], options, &reads);
             CHECK(a.code == SQLITE_OK, "eps %g: %s", eps[n], a.error);
             assert_true(reads.count > 0);
@@ -760,6 +825,7 @@ int main(void) {
         cmocka_unit_test(a_terrain_is_found_by_name_or_the_sentence_says_what_there_is),
         cmocka_unit_test(a_window_is_the_raster),
         cmocka_unit_test(heights_are_the_planes_of_the_full_raster_or_of_the_mesh),
+        cmocka_unit_test(a_height_is_the_one_of_the_patch_of_the_point),
         cmocka_unit_test(rasters_of_one_row_or_column_have_heights_and_no_mesh),
         cmocka_unit_test(every_way_of_selecting_gives_one_mesh_and_reads_tell_which_blocks),
         cmocka_unit_test(a_block_answered_by_its_index_row_is_not_read),

@@ -83,7 +83,8 @@ static int read_everything(sqlite3 *db, const expected *right, const char **step
     }
     if (code == SQLITE_OK) {
         *step = "closing query";
-        a = query_store(s, "t", 3, (store_query_options){RQT_SELECT_BOTTOM_UP, RQT_OUTLINE_TOL}, NULL);
+        a = query_store(s, "t", 3,
+                        (store_query_options){.select = RQT_SELECT_BOTTOM_UP, .outline = RQT_OUTLINE_TOL}, NULL);
         code = a.code;
         if (code == SQLITE_OK && !same_answer(&a, &right->closed)) code = -1;
     }
@@ -201,10 +202,11 @@ static void memory_may_run_out_anywhere(void **state) {
     char path[128];
     sqlite3 *db = open_database(scratch_file(path, "memory.db"));
     put_terrain(db, "t", 18, 11, 2, 1, false);
-    expected right = {.fine = query_database(db, 0, by_threshold),
-                      .coarse = query_database(db, 8, by_threshold),
-                      .closed =
-                          query_database(db, 3, (store_query_options){RQT_SELECT_BOTTOM_UP, RQT_OUTLINE_TOL})};
+    expected right = {
+        .fine = query_database(db, 0, by_threshold),
+        .coarse = query_database(db, 8, by_threshold),
+        .closed = query_database(
+            db, 3, (store_query_options){.select = RQT_SELECT_BOTTOM_UP, .outline = RQT_OUTLINE_TOL})};
     store *s;
     const store_terrain *t;
     bool found;
@@ -308,7 +310,8 @@ static void a_damaged_terrain_gives_an_error_or_the_right_answer(void **state) {
         assert_int_equal(store_open(db, &s), SQLITE_OK);
         for (size_t e = 0; e < sizeof eps / sizeof *eps; e++)
             for (int way = 0; way < 12; way++) {
-                const store_query_options options = {(rqt_select)(way % 3), (rqt_outline)(way / 3 % 2)};
+                const store_query_options options = {.select = (rqt_select)(way % 3),
+                                                     .outline = (rqt_outline)(way / 3 % 2)};
                 const answer right = query_region(right_store, "t", regions[way / 6], eps[e], options, NULL);
                 const answer a = query_region(s, "t", regions[way / 6], eps[e], options, NULL);
                 if (a.code != SQLITE_OK) {

@@ -330,7 +330,7 @@ static inline void edit_summary(sqlite3 *db, rqt_block_number number, void (*edi
 
 /* --------------------------------------------------------------------------------------------- queries */
 
-static const store_query_options by_threshold = {RQT_SELECT_THRESHOLD, RQT_OUTLINE_EXACT};
+static const store_query_options by_threshold = {.select = RQT_SELECT_THRESHOLD, .outline = RQT_OUTLINE_EXACT};
 
 /* What a query gave, small enough to compare: a hash over triangles as samples with heights, in order. */
 typedef struct answer {

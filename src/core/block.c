@@ -39,3 +39,31 @@ void rqt_block_set_corners(rqt_block *block, const rqt_summary *summary) {
             (uint8_t)((block->flags[at[c]] & RQT_VALID) | (summary->corner[c].flags & RQT_OUTLINE));
     }
 }
+
+/* Vertices past the raster, in blocks that reach over its edge, have no error of their own: see lattice_has_area.
+ * They take what those that depend on them in the block have, so that the vertices above any eps are a closed set
+ * in the block as well. Fine to coarse: sides from centres of half their scale, centres from sides of their own. */
+void block_settle_past(rqt_block *b) {
+    const int32_t n = (1 << b->k) + 1;
+    if (b->width == n && b->height == n) return;
+    for (int32_t q = 1; q < n - 1; q *= 2) {
+        for (int kind = q == 1 ? 1 : 0; kind < 2; kind++) { /* 0: sides, 1: centres */
+            for (int32_t v = kind ? q : 0; v < n; v += kind ? 2 * q : q) {
+                const bool odd = v / q & 1;
+                for (int32_t u = kind || !odd ? q : 0; u < n; u += 2 * q) {
+                    if (u - q < b->width - 1 && v - q < b->height - 1) continue;
+                    const ptrdiff_t at = (ptrdiff_t)v * n + u;
+                    for (int c = 0; c < 4; c++) {
+                        const int32_t h = q / 2;
+                        const int32_t x = u + (kind ? (c == 0 ? -q : c == 1 ? q : 0) : c & 1 ? h : -h);
+                        const int32_t y = v + (kind ? (c == 2 ? -q : c == 3 ? q : 0) : c & 2 ? h : -h);
+                        if (x < 0 || y < 0 || x >= n || y >= n) continue;
+                        const ptrdiff_t from = (ptrdiff_t)y * n + x;
+                        if (b->error[from] > b->error[at]) b->error[at] = b->error[from];
+                        b->flags[at] = (uint8_t)(b->flags[at] | (b->flags[from] & RQT_OUTLINE));
+                    }
+                }
+            }
+        }
+    }
+}

@@ -64,7 +64,7 @@ struct rqt_codec {
     uint8_t flags[LARGEST_COUNT];
     uint8_t bits[BIT_BYTES(LARGEST_COUNT)];
     error_scratch errors;
-    outline_scratch outline;
+    flag_scratch marks;
     kept_list list;
     uint8_t payload[PAYLOAD_BOUND(LARGEST_COUNT) + READ_PAST];
 };
@@ -250,28 +250,6 @@ static int put_planes16(uint8_t **to, const uint16_t *v, size_t count) {
     return planes;
 }
 
-/* n numbers from the planes that start at p and are `plane` bytes apart. */
-static void get_planes(const uint8_t *p, size_t plane, int planes, int32_t n, uint32_t *v) {
-    const uint8_t *a = p, *b = a + plane, *c = b + plane, *d = c + plane;
-    switch (planes) {
-    case 0:
-        for (int32_t i = 0; i < n; i++) v[i] = 0;
-        break;
-    case 1:
-        for (int32_t i = 0; i < n; i++) v[i] = a[i];
-        break;
-    case 2:
-        for (int32_t i = 0; i < n; i++) v[i] = (uint32_t)(a[i] | b[i] << 8);
-        break;
-    case 3:
-        for (int32_t i = 0; i < n; i++) v[i] = (uint32_t)(a[i] | b[i] << 8 | c[i] << 16);
-        break;
-    default:
-        for (int32_t i = 0; i < n; i++) v[i] = (uint32_t)(a[i] | b[i] << 8 | c[i] << 16) | (uint32_t)d[i] << 24;
-        break;
-    }
-}
-
 static void get_planes16(const uint8_t *p, size_t count, int planes, uint16_t *v) {
     const uint8_t *high = p + count;
     if (planes == 0) memset(v, 0, count * sizeof *v);
@@ -378,12 +356,6 @@ static void repeat_heights(int32_t *q, int32_t n, int32_t width, int32_t height)
     for (int32_t y = height; y < n; y++) memcpy(q + y * n, q + (height - 1) * n, (size_t)n * sizeof *q);
 }
 
-static void repeat_flags(uint8_t *flags, int32_t n, int32_t width, int32_t height) {
-    for (int32_t y = 0; y < height && width < n; y++)
-        memset(flags + y * n + width, flags[y * n + width - 1], (size_t)(n - width));
-    for (int32_t y = height; y < n; y++) memcpy(flags + y * n, flags + (height - 1) * n, (size_t)n);
-}
-
 /* Compress the payload into one frame; its pieces end at ends[]. Each is flushed, and so gets entropy tables of its
  * own: heights, errors and bits are too different to share theirs. Returns 0 when there is no memory. */
 static size_t compress(rqt_codec *codec, const size_t ends[PIECES], bool in_pieces, uint8_t *bytes, size_t room) {
@@ -451,12 +423,18 @@ static bool put_whole(rqt_codec *codec, const rqt_block *block, rqt_block_header
     repeat_heights(codec->q, n, width, height);
     copy_flags(block, codec->flags);
     uint8_t *const outline = codec->bits;
-    h->has_outline = predict_outline(&codec->outline, block->k, width, height, codec->flags, outline);
+    h->has_outline = predict_outline(&codec->marks, block->k, width, height, codec->flags, outline);
     const rqt_block flagged = {.k = block->k, .error = block->error, .flags = codec->flags};
     h->ground = h->has_outline ? ground_of(&flagged) : 0;
-    const error_field field = {
-        block->k,  width,     height, codec->q, h->has_voids || h->all_void || h->has_outline ? codec->flags : NULL,
-        h->ground, h->quantum};
+    const error_field field = {block->k,
+                               width,
+                               height,
+                               codec->q,
+                               h->has_voids || h->all_void || h->has_outline ? codec->flags : NULL,
+                               h->ground,
+                               h->quantum,
+                               false,
+                               false};
     predict_errors(&codec->errors, &field, block->error);
     h->finest_planes = put_planes16(p, codec->errors.residual, finest);
     h->error_planes = put_planes16(p, codec->errors.residual + finest, count - KEPT_CORNERS - finest);
@@ -484,7 +462,7 @@ static bool put_sparse(rqt_codec *codec, const rqt_block *block, rqt_block_heade
     size_t valid = 0, outline = 0;
     uint32_t bad = 0;
     for (size_t i = 0; i < list->count; i++) {
-        const int32_t at = list->place[i];
+        const int32_t at = list->vertex[i].at;
         const uint8_t flags = block->flags[at];
         const uint32_t q = (uint32_t)block->q[at], largest = RQT_HEIGHT_LIMIT - 1;
         if (flags > (RQT_VALID | RQT_OUTLINE)) return false;
@@ -552,55 +530,37 @@ rqt_status rqt_block_encode(rqt_codec *codec, const rqt_block *block, double qua
 
 /* ---------------------------------------------------------------------------------------------- decode */
 
-static bool restore_heights(rqt_codec *codec, const rqt_block_header *h, const uint8_t *planes, int32_t *q) {
-    const int32_t n = side_of(h->k);
-    uint32_t bad = 0;
-    for (int32_t y = 0; y < h->height; y++) {
-        int32_t *row = q + (ptrdiff_t)y * n;
-        get_planes(planes + (size_t)y * (size_t)h->width, stored_of(h), h->height_planes, h->width,
-                   codec->residual);
-        bad |= restore_height_row(codec->residual, y ? row - n : NULL, h->width, row);
-    }
-    repeat_heights(q, n, h->width, h->height);
-    return bad >> 31 == 0;
-}
-
-static bool restore_validity(const rqt_block_header *h, const uint8_t *bits, uint8_t *flags) {
-    const int32_t n = side_of(h->k);
-    if (!h->has_voids) {
-        memset(flags, h->all_void ? 0 : RQT_VALID, count_of(h->k));
-        return true;
-    }
-    size_t valid = 0;
-    for (int32_t y = 0; y < h->height; y++) {
-        uint8_t *row = flags + (ptrdiff_t)y * n;
-        valid += get_bits(bits, (size_t)y * (size_t)h->width, row, h->width, RQT_VALID);
-    }
-    repeat_flags(flags, n, h->width, h->height);
-    return valid > 0 && valid < stored_of(h) && padding_is_zero(bits, stored_of(h));
-}
-
 /* A decoded payload of a block that keeps all vertices. NULL, or what is wrong with it. */
 static const char *get_whole(rqt_codec *codec, const rqt_block_header *h, rqt_block *block) {
     const size_t finest = finest_of(h->k), others = count_of(h->k) - KEPT_CORNERS - finest;
     const uint8_t *p = codec->payload + stored_of(h) * (size_t)h->height_planes;
-    if (!restore_heights(codec, h, codec->payload, block->q)) return "heights that are out of range";
-    get_planes16(p, finest, h->finest_planes, codec->errors.residual);
+    const int32_t n = side_of(h->k);
+    if (restore_heights(codec->payload, stored_of(h), h->height_planes, h->width, h->height, n, block->q) >> 31)
+        return "heights that are out of range";
+    repeat_heights(block->q, n, h->width, h->height);
+    if (h->finest_planes) get_planes16(p, finest, h->finest_planes, codec->errors.residual);
     p += finest * (size_t)h->finest_planes;
-    get_planes16(p, others, h->error_planes, codec->errors.residual + finest);
+    if (h->error_planes) get_planes16(p, others, h->error_planes, codec->errors.residual + finest);
     p += others * (size_t)h->error_planes;
-    if (!restore_validity(h, p, block->flags)) return "validity bits that are not what its flags promise";
-    if (h->has_voids) p += BIT_BYTES(stored_of(h));
-    if (h->has_outline && (!padding_is_zero(p, count_of(h->k)) ||
-                           !restore_outline(&codec->outline, h->k, h->width, h->height, p, block->flags)))
-        return "outline bits that are not what its flags promise";
+    const flag_source from = {h->k,
+                              h->width,
+                              h->height,
+                              h->all_void,
+                              h->has_voids ? p : NULL,
+                              h->has_outline ? p + (h->has_voids ? BIT_BYTES(stored_of(h)) : 0) : NULL};
+    if ((from.validity && !padding_is_zero(from.validity, stored_of(h))) ||
+        (from.outline && !padding_is_zero(from.outline, count_of(h->k))) ||
+        !restore_flags(&codec->marks, &from, block->flags))
+        return "validity or outline bits that are not what its flags promise";
     const error_field field = {h->k,
                                h->width,
                                h->height,
                                block->q,
                                h->has_voids || h->all_void || h->has_outline ? block->flags : NULL,
                                h->ground,
-                               h->quantum};
+                               h->quantum,
+                               h->finest_planes == 0,
+                               h->error_planes == 0};
     restore_errors(&codec->errors, &field, block->error);
     return NULL;
 }
@@ -626,15 +586,16 @@ static const char *get_sparse(rqt_codec *codec, const rqt_block_header *h, rqt_b
             if (valid == 0 || valid == kept || !padding_is_zero(validity, kept))
                 return "validity bits that are not what its flags promise";
         }
-        for (size_t i = 0; i < kept; i++) block->flags[list->place[i]] = h->has_voids ? flags[i] : 0;
+        for (size_t i = 0; i < kept; i++) block->flags[list->vertex[i].at] = h->has_voids ? flags[i] : 0;
     }
     if (h->has_outline) {
         if (get_bits(outline, 0, flags, (int32_t)count, RQT_OUTLINE) == 0 || !padding_is_zero(outline, count))
             return "outline bits that are not what its flags promise";
-        for (size_t i = 0; i < count; i++) block->flags[list->place[i + KEPT_CORNERS]] |= flags[i];
+        for (size_t i = 0; i < count; i++) block->flags[list->vertex[i + KEPT_CORNERS].at] |= flags[i];
     }
     get_planes16(errors, count, h->error_planes, codec->errors.residual);
-    if (!restore_kept_errors(list, block, h->quantum, h->ground, codec->errors.residual))
+    if (!restore_kept_errors(list, block, h->has_voids || h->all_void || h->has_outline, h->quantum, h->ground,
+                             codec->errors.residual))
         return "a vertex that is kept although its error is not above the floor";
     return NULL;
 }

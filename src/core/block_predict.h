@@ -6,32 +6,66 @@
 
 #include <math.h>
 
+/* A function compiled a second time for machines with AVX2: the same bytes, for it has the same operations (and
+ * none fused). All that it calls must be compiled into it. (Sanitizers cannot follow the choice at load time.) */
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
+    !defined(RQT_SCALAR)
+#define VECTOR_CLONES __attribute__((target_clones("avx2", "default")))
+#else
+#define VECTOR_CLONES
+#endif
+#define INLINE static inline __attribute__((always_inline))
+
 enum {
     LARGEST_N = (1 << RQT_MAX_BLOCK_K) + 1,
     LARGEST_COUNT = LARGEST_N * LARGEST_N,
 };
 
 /* Signed residuals as small unsigned numbers: 0, -1, 1, -2, 2 ... */
-static inline uint32_t zigzag32(uint32_t r) {
+INLINE uint32_t zigzag32(uint32_t r) {
     return r << 1 ^ (0 - (r >> 31));
 }
-static inline uint32_t unzigzag32(uint32_t v) {
+INLINE uint32_t unzigzag32(uint32_t v) {
     return v >> 1 ^ (0 - (v & 1));
 }
-static inline uint16_t zigzag16(uint16_t r) {
+INLINE uint16_t zigzag16(uint16_t r) {
     return (uint16_t)(r << 1 ^ (0 - (r >> 15)));
 }
-static inline uint16_t unzigzag16(uint16_t v) {
+INLINE uint16_t unzigzag16(uint16_t v) {
     return (uint16_t)(v >> 1 ^ (0 - (v & 1)));
 }
 
 /* Residuals of one row of heights. above is NULL for the first row. */
 void predict_height_row(const int32_t *row, const int32_t *above, int32_t width, uint32_t *residual);
-/* The row from its residuals. Returns a number with its top bit set when a height is beyond RQT_HEIGHT_LIMIT. */
-uint32_t restore_height_row(const uint32_t *residual, const int32_t *above, int32_t width, int32_t *row);
+/* All stored rows of a block, `side` apart, from `count` planes of residuals that are `stored` bytes apart. Returns
+ * a number with its top bit set when a height is beyond RQT_HEIGHT_LIMIT. */
+uint32_t restore_heights(const uint8_t *planes, size_t stored, int count, int32_t width, int32_t height,
+                         int32_t side, int32_t *q);
+
+/* n numbers from the planes that start at p and are `plane` bytes apart. */
+INLINE void get_planes(const uint8_t *p, size_t plane, int planes, int32_t n, uint32_t *v) {
+    const uint8_t *a = p, *b = a + plane, *c = b + plane, *d = c + plane;
+    switch (planes) {
+    case 0:
+        for (int32_t i = 0; i < n; i++) v[i] = 0;
+        break;
+    case 1:
+        for (int32_t i = 0; i < n; i++) v[i] = a[i];
+        break;
+    case 2:
+        for (int32_t i = 0; i < n; i++) v[i] = (uint32_t)(a[i] | b[i] << 8);
+        break;
+    case 3:
+        for (int32_t i = 0; i < n; i++) v[i] = (uint32_t)(a[i] | b[i] << 8 | c[i] << 16);
+        break;
+    default:
+        for (int32_t i = 0; i < n; i++) v[i] = (uint32_t)(a[i] | b[i] << 8 | c[i] << 16) | (uint32_t)d[i] << 24;
+        break;
+    }
+}
 
 /* The code nearest above a float >= 0: 8 significant bits are the top 16 of its bits, with another bias. */
-static inline rqt_code code_near_above(float v) {
+INLINE rqt_code code_near_above(float v) {
     uint32_t bits;
     memcpy(&bits, &v, 4);
     uint32_t code = ((bits + 0xFFFF) >> 16) + ((263 - 7 - 127) << 7);
@@ -39,11 +73,11 @@ static inline rqt_code code_near_above(float v) {
 }
 
 /* What z differs from the midpoint of two heights with this sum: |2z - sum| times half, as a code. */
-static inline rqt_code midpoint_code(int32_t z, uint32_t sum, float half) {
+INLINE rqt_code midpoint_code(int32_t z, uint32_t sum, float half) {
     return code_near_above(fabsf((float)(int32_t)(2 * (uint32_t)z - sum)) * half);
 }
 
-static inline uint32_t sum_of(int32_t a, int32_t b) {
+INLINE uint32_t sum_of(int32_t a, int32_t b) {
     return (uint32_t)a + (uint32_t)b;
 }
 
@@ -53,7 +87,7 @@ float half_of(double quantum);
 
 /* What an outline costs at a scale, by what it costs at the finest: a triangle twice as wide costs twice as much.
  */
-static inline rqt_code ground_at(rqt_code ground, int scale) {
+INLINE rqt_code ground_at(rqt_code ground, int scale) {
     const uint32_t code = ground + 128u * (uint32_t)scale;
     return (rqt_code)(code < RQT_CODE_INFINITY ? code : RQT_CODE_INFINITY);
 }
@@ -76,6 +110,7 @@ typedef struct error_field {
     const uint8_t *flags;  /* NULL: all valid, and no outline */
     rqt_code ground;       /* what an outline vertex of the finest scale errs; 0: not known */
     double quantum;
+    bool finest_exact, others_exact; /* restoring: the residuals of the finest scale, of the others are all 0 */
 } error_field;
 
 /* error (row by row; the corners do not count) -> scratch->residual. */
@@ -83,33 +118,41 @@ void predict_errors(error_scratch *scratch, const error_field *field, const rqt_
 /* scratch->residual -> error, that of the corners 0. */
 void restore_errors(error_scratch *scratch, const error_field *field, rqt_code *error);
 
-/* ------------------------------------------------------------------------------------- outline bits:
- * block_outline.c
- */
+/* --------------------------------------------------------------------- validity and outline: block_flags.c */
 
 enum { ROW_WORDS = (LARGEST_N + 63) / 64 };
 typedef struct bit_grid {
     uint64_t row[LARGEST_N][ROW_WORDS];
 } bit_grid;
-typedef struct outline_scratch {
+typedef struct flag_scratch {
     bit_grid valid, outline, residual;
-} outline_scratch;
+} flag_scratch;
 
 /* Outline bits of flags -> n*n residual bits, row by row; the corners do not count. False: there are none. */
-bool predict_outline(outline_scratch *scratch, int k, int32_t width, int32_t height, const uint8_t *flags,
+bool predict_outline(flag_scratch *scratch, int k, int32_t width, int32_t height, const uint8_t *flags,
                      uint8_t *bits);
-/* And back, into flags that have their validity and nothing else. bits is followed by 16 bytes that may be read.
- * False: no bit comes out, or a corner has one. */
-bool restore_outline(outline_scratch *scratch, int k, int32_t width, int32_t height, const uint8_t *bits,
-                     uint8_t *flags);
+
+typedef struct flag_source {
+    int k;
+    int32_t width, height;
+    bool all_void;
+    const uint8_t *validity; /* bits of width*height; NULL: all alike */
+    const uint8_t *outline;  /* residuals; NULL: none. After both, 16 more bytes may be read. */
+} flag_source;
+/* And back. False: validity bits that are all alike, no outline bit that comes out, or a corner's. */
+bool restore_flags(flag_scratch *scratch, const flag_source *from, uint8_t *flags);
 
 /* ------------------------------------------------------------------------------- sparse blocks: block_sparse.c */
 
 enum { KEPT_CORNERS = 4 };
 
 /* The kept vertices of a block, the corners first, then from coarse to fine. */
+typedef struct kept_vertex {
+    int32_t at; /* y * n + x */
+    int16_t x, y;
+} kept_vertex;
 typedef struct kept_list {
-    int32_t place[LARGEST_COUNT + 1]; /* y * n + x */
+    kept_vertex vertex[LARGEST_COUNT + 1];
     size_t count;
     int scales;                     /* of these, coarsest first: */
     size_t end[RQT_MAX_BLOCK_K][2]; /* where its centres end, where its sides end */
@@ -133,8 +176,9 @@ rqt_code kept_ground(const kept_list *list, const rqt_block *block);
 /* block->error -> count - KEPT_CORNERS residuals. scratch: n*n. */
 void predict_kept_errors(const kept_list *list, const rqt_block *block, const int32_t *q, double quantum,
                          rqt_code ground, rqt_code *scratch, uint16_t *residual);
-/* Into block->error, which is 0 throughout. False: a vertex is kept without reason. */
-bool restore_kept_errors(const kept_list *list, const rqt_block *block, double quantum, rqt_code ground,
-                         const uint16_t *residual);
+/* Into block->error, which is 0 throughout. flagged: a vertex is void, or has the outline bit. False: a vertex is
+ * kept without reason. */
+bool restore_kept_errors(const kept_list *list, const rqt_block *block, bool flagged, double quantum,
+                         rqt_code ground, uint16_t *residual);
 
 #endif

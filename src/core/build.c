@@ -314,6 +314,7 @@ rqt_status rqt_build_tile(rqt_build *w, const rqt_band *band, int32_t tile, rqt_
                 settle_em(w, &place, n);
                 begin_block(w, &place, n, block);
                 gather_from_band(w, band, &place, block);
+                block_settle_past(block);
                 settle_below(block, n);
                 if (level == 0) note_max_error(w, block, n);
                 summarize_from_band(w, band, &place, block, &summary);
@@ -401,6 +402,7 @@ rqt_status rqt_build_coarse(rqt_build *w, const rqt_sweep *sweep, int level, int
     for (int32_t v = 0; v < side && ok; v++) ok = gather_kept_row(w, sweep, &place, v, row, block);
     memory_drop(&w->allocator, row);
     if (!ok) return RQT_READ_FAILED;
+    block_settle_past(block);
     settle_below(block, n);
     if (level == 0) note_max_error(w, block, n);
     memset(&summary, 0, sizeof summary);

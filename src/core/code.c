@@ -35,7 +35,8 @@ double rqt_unit_metres(const rqt_unit *unit, int32_t q) {
 double rqt_code_metres(rqt_code code) {
     if (code == 0) return 0;
     if (code == RQT_CODE_INFINITY) return INFINITY;
-    return ldexp(128 + (code & 127), (code >> 7) - 263);
+    /* (128 + low 7 bits) * 2^(high bits - 263): 1.xxxxxxx times a power of two that every double has */
+    return bits_double((uint64_t)((code >> 7) - 256 + 1023) << 52 | (uint64_t)(code & 127) << 45);
 }
 
 static int64_t bits_of(double v) {

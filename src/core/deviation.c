@@ -294,6 +294,35 @@ rqt_code outline_code(const deviation_field *s, const rqt_triangle *t) {
     return rqt_code_from_ground(larger(box.x1 - box.x0, box.y1 - box.y0), s->cost.cell, s->cost.c);
 }
 
+static const sample_window everywhere = {0, 0, INT32_MAX, INT32_MAX};
+
+triangle_error irregular_error(const deviation_field *s, const rqt_triangle *t, int known_state) {
+    const plane_triangle p = triangle_of_samples(s, t);
+    triangle_error out = {.state = known_state, .denominator = 1};
+    if (known_state < 0 || p.has_plane) {
+        const sample_triangle clamped = sample_triangle_of(s, &p);
+        const scan found = scan_triangle(s, &clamped, &everywhere, p.has_plane);
+        out.state = found.state;
+        if (p.has_plane) {
+            out.deviation = found.deviation;
+            out.denominator = (uint64_t)clamped.area;
+            out.code = rqt_code_from_quanta(&s->scale.unit, (uint64_t)(found.deviation >> 64),
+                                            (uint64_t)found.deviation, out.denominator);
+        }
+    }
+    out.mixed = out.state == (HAS_VALID | HAS_VOID);
+    if (out.mixed) {
+        out.ground = outline_code(s, t);
+        if (out.ground > out.code) out.code = out.ground;
+    }
+    return out;
+}
+
+uint64_t regular_deviation(const deviation_field *s, const rqt_triangle *t, int *shift) {
+    const plane_triangle p = triangle_of_samples(s, t);
+    return plane_deviation(s, &p, &everywhere, shift);
+}
+
 int64_t relief_of(const rqt_grid *grid) {
     int32_t low = INT32_MAX, high = INT32_MIN;
     const size_t n = (size_t)grid->lattice.width * (size_t)grid->lattice.height;

@@ -41,6 +41,23 @@ static inline size_t sample_index(const deviation_field *s, int32_t x, int32_t y
     return (size_t)(y - s->first_row) * (size_t)s->width + (size_t)x;
 }
 
+/* The sample of a lattice vertex, clamped, of the rows at hand. */
+static inline size_t clamped_index(const deviation_field *s, int32_t x, int32_t y) {
+    return sample_index(s, x < s->width ? x : s->width - 1, y < s->height ? y : s->height - 1);
+}
+
+static inline int32_t height_at(const deviation_field *s, int32_t x, int32_t y) {
+    return s->q[clamped_index(s, x, y)];
+}
+
+static inline bool valid_at(const deviation_field *s, int32_t x, int32_t y) {
+    return !s->valid || s->valid[clamped_index(s, x, y)] != 0;
+}
+
+static inline int state_at(const deviation_field *s, int32_t x, int32_t y) {
+    return valid_at(s, x, y) ? HAS_VALID : HAS_VOID;
+}
+
 /* Does the clamped triangle have an area? Those that have none cost nothing and are never mixed. */
 bool triangle_has_area(const deviation_field *s, const rqt_triangle *t);
 /* The triangle with the heights of its corners, all of which are in rows at hand. */
@@ -50,6 +67,19 @@ plane_triangle triangle_of_samples(const deviation_field *s, const rqt_triangle 
 triangle_part measure_triangle(const deviation_field *s, const plane_triangle *t, const sample_window *window);
 /* What a mixed triangle costs at least. */
 rqt_code outline_code(const deviation_field *s, const rqt_triangle *t);
+/* A whole triangle in parts, for other metrics: the largest |height - plane| is deviation / denominator quanta, 0
+ * where a corner is void; ground: what an outline costs, 0 unless mixed; code: the larger of both. */
+typedef struct triangle_error {
+    int state; /* HAS_VALID | HAS_VOID over the closed triangle */
+    bool mixed;
+    unsigned __int128 deviation;
+    uint64_t denominator;
+    rqt_code ground, code;
+} triangle_error;
+/* Of a triangle with an area that is mixed, or clamped, or both. known_state < 0: to be found out. */
+triangle_error irregular_error(const deviation_field *s, const rqt_triangle *t, int known_state);
+/* Of one inside the raster whose samples are all valid, the deviation as a multiple of 2^-*shift quanta. */
+uint64_t regular_deviation(const deviation_field *s, const rqt_triangle *t, int *shift);
 /* The largest difference of two valid heights. */
 int64_t relief_of(const rqt_grid *grid);
 

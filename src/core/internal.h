@@ -96,13 +96,17 @@ static inline bool lattice_is_corner(const rqt_lattice *lattice, rqt_vertex v) {
 }
 
 /* Does the diamond of a vertex have an area on the raster? Without one, past the last column or row, no triangle of
- * a mesh has it for a corner, and its error is stored as 0: so that what is stored does not depend on how far past
- * the raster somebody looked. The root's corners always count. */
+ * a mesh has it for a corner; its error is not looked at when blocks are made (block_settle_past), so that what is
+ * stored does not depend on how far past the raster somebody looked. The root's corners always count. */
 static inline bool lattice_has_area(const rqt_lattice *lattice, rqt_vertex v) {
     if (lattice_is_corner(lattice, v)) return true;
     const int32_t q = (v.x | v.y) & -(v.x | v.y);
     return v.x - q < lattice->width - 1 && v.y - q < lattice->height - 1;
 }
+
+/* The errors of a block's vertices whose diamonds have no area, which are 0 on entry: from those that depend on
+ * them in the block. block.c */
+void block_settle_past(rqt_block *block);
 
 /* Where column x (0 .. 2^K) of the lattice sits in the arrays of rqt_errors; -1 when it is past the last sample and
  * no error can reach it. lattice.c */

@@ -63,7 +63,12 @@ void rqt_mesh_encode(const rqt_mesh_header *header, const rqt_patch_vertex *vert
         put32(p + 4, (uint32_t)vertices[i].row);
         put32(p + 8, (uint32_t)vertices[i].q);
     }
+#if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
+    if (header->index_count) memcpy(p, indices, header->index_count * INDEX_BYTES);
+    p += header->index_count * INDEX_BYTES;
+#else
     for (uint64_t i = 0; i < header->index_count; i++, p += INDEX_BYTES) put32(p, indices[i]);
+#endif
     put64(bytes + AT_CHECKSUM, checksum64(bytes, (size_t)(p - bytes), AT_CHECKSUM));
 }
 

@@ -196,6 +196,5 @@ void rqt_pyramid_block(const rqt_pyramid *p, size_t n, rqt_block_number *number,
             block->flags[i] = (uint8_t)(flags | (outline ? RQT_OUTLINE : 0));
         }
     }
-    block->sparse = place.stride > 1;
-    block->floor = block->sparse ? b->em : 0;
+    block_settle_past(block);
 }

@@ -498,6 +498,9 @@ typedef struct rqt_patch {
     size_t triangle_count;
     rqt_triangle *leaves; /* NULL unless the query asked: the same triangles by lattice vertices, unclamped */
     rqt_allocator allocator;
+    uint32_t *strip; /* NULL unless the query asked: what rqt_strip_build makes of the triangles */
+    size_t strip_count;
+    size_t vertex_capacity, triangle_capacity, leaf_capacity, strip_capacity; /* elements there is room for */
 } rqt_patch;
 
 void rqt_patch_free(rqt_patch *patch);
@@ -510,6 +513,18 @@ typedef struct rqt_answer { /* a block of the index that answers eps and whose e
     rqt_summary summary;
 } rqt_answer;
 
+/* What a patch is to hold beside its vertices. triangle_count is told in any case. */
+typedef enum rqt_product { RQT_PRODUCT_TRIANGLES, RQT_PRODUCT_STRIP, RQT_PRODUCT_VERTICES } rqt_product;
+
+/* Memory that one query leaves to the next, so that not every query has to ask for it and touch it anew. For one
+ * thread. */
+typedef struct rqt_scratch rqt_scratch;
+rqt_status rqt_scratch_create(const rqt_allocator *allocator, rqt_scratch **scratch);
+void rqt_scratch_free(rqt_scratch *scratch);
+/* Instead of rqt_patch_free: the patch's memory goes to the next query. What is kept is at most `limit` bytes, the
+ * rest is released. */
+void rqt_scratch_keep(rqt_scratch *scratch, rqt_patch *patch, size_t limit);
+
 typedef struct rqt_query {
     rqt_lattice lattice;
     int k;
@@ -517,8 +532,10 @@ typedef struct rqt_query {
     rqt_code eps;
     rqt_select select;
     rqt_outline outline;
-    bool wants_leaves;   /* fill patch->leaves */
-    rqt_answer *answers; /* in any order; sorted into Morton order by the query */
+    rqt_product product;
+    bool wants_leaves;    /* fill patch->leaves; with RQT_PRODUCT_TRIANGLES only */
+    rqt_scratch *scratch; /* NULL: none; made with the same allocator as the query is run with */
+    rqt_answer *answers;  /* in any order; sorted into Morton order by the query */
     size_t answer_count;
     /* The decoded block of a number, valid until the next call. NULL: the query stops with RQT_READ_FAILED. */
     const rqt_block *(*read_block)(void *context, rqt_block_number number);
@@ -530,13 +547,66 @@ typedef struct rqt_query {
 bool rqt_summary_answers(const rqt_summary *summary, rqt_outline outline, rqt_code eps);
 /* Does the query need this block's bytes, or is its summary enough? */
 bool rqt_summary_needs_block(const rqt_summary *summary, rqt_outline outline, rqt_code eps);
+/* Does this query need an answer's bytes? Not where the summary is enough, nor where the block only touches the
+ * region. Queries that close their selection (rqt_select) look at all that summaries leave open. */
+bool rqt_query_needs_block(const rqt_query *query, const rqt_answer *answer);
 /* The patch of a query (mode `cover`): each kept leaf that belongs to the region, once. */
 rqt_status rqt_query_run(rqt_query *query, const rqt_allocator *allocator, rqt_patch *patch);
+
+/* The leaf that a point lies inside, without a patch. */
+typedef enum rqt_found {
+    RQT_FOUND_LEAF,    /* that one, and none else of the mesh */
+    RQT_FOUND_NOTHING, /* the point is in no kept leaf */
+    RQT_FOUND_UNSURE   /* on an edge, at the raster's end, or somewhere else: make the patch of the point */
+} rqt_found;
+typedef struct rqt_leaf_corner {
+    int32_t col, row, q;
+} rqt_leaf_corner;
+/* x, y: the point in 2^-20 samples. answer: a block that answers the query (lattice, k, eps, select, outline are
+ * read) and holds the point; block: its bytes, decoded, or NULL where rqt_summary_needs_block says no. leaf: the
+ * corners as the patch of the point has them, in its order. */
+rqt_found rqt_query_leaf_at(const rqt_query *query, const rqt_answer *answer, const rqt_block *block, int64_t x,
+                            int64_t y, rqt_leaf_corner leaf[3]);
 
 /* One generalized strip of a patch: n indices; triangle i is (s[i], s[i+1], s[i+2]), its last two swapped for odd
  * i, counter-clockwise; a triangle with two equal vertices is a join. An empty patch gives n = 0.
  * Release with allocator->resize(context, strip, 0). */
 rqt_status rqt_strip_build(const rqt_patch *patch, const rqt_allocator *allocator, uint32_t **strip, size_t *n);
+/* The same as rqt_strip_build, by the walk of [RQT] section 7: round the centres of quadtree blocks. Needs
+ * patch->leaves (RQT_INVALID without). */
+rqt_status rqt_strip_build_fans(const rqt_patch *patch, const rqt_allocator *allocator, uint32_t **strip,
+                                size_t *n);
+
+/* ---------------------------------------------------------------------------------------- other metrics --
+ * Other answers to the question "how wrong is a mesh without this vertex", for comparing, and the one that gives
+ * the smallest meshes: METHODS.md beside this file has the definitions, the proofs, and what each costs. Every
+ * triangle T of the bintree gets a number; a vertex gets the larger number of its diamond; saturation does the
+ * rest, as for the exact errors, which are the metric `exact`. `minimal` alone is made otherwise: it is closed by
+ * nature. */
+typedef enum rqt_metric {
+    RQT_METRIC_EXACT,   /* the largest vertical distance of a sample of T from T's plane: a bound */
+    RQT_METRIC_MINIMAL, /* the least closed set no leaf of which has a larger one: a bound, and the smallest mesh */
+    RQT_METRIC_LOCAL,   /* of the split vertex alone from the hypotenuse: no bound */
+    RQT_METRIC_WEDGIE,  /* that, plus the larger number of the two halves: a bound, not a tight one */
+    RQT_METRIC_EUCLID   /* the largest distance of a sample of T from T's plane in space: no bound of heights */
+} rqt_metric;
+#define RQT_METRICS 5
+
+/* "exact", "minimal" ...; NULL when there is none. */
+const char *rqt_metric_name(rqt_metric metric);
+/* Is the mesh of eps nowhere further than eps from a sample, vertically? */
+bool rqt_metric_is_bound(rqt_metric metric);
+/* The most bytes that rqt_metric_compute holds at a time, its result included. */
+size_t rqt_metric_bytes(const rqt_lattice *lattice, rqt_metric metric);
+/* The metric of every vertex, closed, and the outline bits, so that a threshold selects: for rqt_pyramid_create.
+ * minimal depends on the outline, because a mixed triangle that has to go takes others along: with
+ * RQT_OUTLINE_EXACT, codes of vertices that are in every mesh are RQT_CODE_LARGEST, with the bit. Codes are rounded
+ * up: exactly, except for euclid, which may be one code further up where it is within 2^-40 of a code, and wedgie,
+ * whose parts at the raster's edge and at voids are rounded up to half a quantum each. O(n log n) time.
+ * progress as in rqt_errors_compute. */
+rqt_status rqt_metric_compute(const rqt_grid *grid, const rqt_unit *unit, const rqt_void_cost *cost,
+                              rqt_metric metric, rqt_outline outline, const rqt_allocator *allocator,
+                              bool (*progress)(void *context, double done), void *context, rqt_errors *closed);
 
 /* --------------------------------------------------------------------------------------- mesh formats --
  * The formats of our own that stand alone (FORMAT.md, "Mesh"): 'strip' and 'indexed'. */
@@ -561,6 +631,65 @@ void rqt_mesh_encode(const rqt_mesh_header *header, const rqt_patch_vertex *vert
  * may be unaligned: copy before use. */
 rqt_status rqt_mesh_decode(const uint8_t *bytes, size_t size, rqt_mesh_header *header, const uint8_t **vertices,
                            const uint8_t **indices);
+
+/* ---------------------------------------------------------------------------------------------- wire --
+ * A patch in about a byte a vertex, to send and to keep: topology as decisions of the walk, heights as residuals
+ * (FORMAT.md, "Wire"). What is decoded is the patch of the query: the same vertices and triangles in the same
+ * order; only the errors of vertices are not sent and read 0. Mesh to memory in ten lines:
+ *
+ *   rqt_wire_header header;
+ *   rqt_patch patch;
+ *   rqt_message why;
+ *   if (rqt_wire_decode(blob, blob_size, false, &allocator, &header, &patch, &why) != RQT_OK) complain(why.text);
+ *   for (size_t i = 0; i < patch.vertex_count; i++) {
+ *       const rqt_patch_vertex *v = &patch.vertices[i];
+ *       put_vertex(header.placement.x0 + v->col * header.placement.dx, header.placement.y0 + v->row *
+ *                  header.placement.dy, rqt_unit_metres(&header.unit, v->q));
+ *   }
+ *   put_indices(patch.triangles, 3 * patch.triangle_count); // counter-clockwise from above
+ *   rqt_patch_free(&patch);
+ *
+ * An *increment* (rqt_delta) brings such a mesh from one eps to a smaller one: it holds the vertices with errors in
+ * (eps, eps_from]. Whatever the steps, the mesh of an eps is the same, bit for bit. */
+#define RQT_WIRE_HEADER_BYTES 144
+
+typedef struct rqt_wire_header {
+    bool is_delta;
+    rqt_lattice lattice;
+    int k;                                 /* block size of the terrain: the order of the walk depends on it */
+    uint64_t vertex_count, triangle_count; /* of the mesh; of an increment: of the mesh that it ends in */
+    rqt_placement placement;
+    rqt_unit unit;
+    double eps;
+    int32_t srid;
+    double eps_from; /* of an increment; else 0 */
+    uint64_t from;   /* of an increment: rqt_wire_digest of the mesh that it begins from; else 0 */
+} rqt_wire_header;
+
+/* The most bytes that rqt_wire_encode can write. */
+size_t rqt_wire_bound(size_t vertex_count, size_t triangle_count, size_t block_count);
+/* The patch of a query with leaves (mode `cover`) as bytes, which have room for rqt_wire_bound. numbers: the blocks
+ * of the query's answers, as rqt_query_run has sorted them. state NULL: the whole mesh; else an increment from the
+ * patch `state` (with leaves, same terrain and region, header->eps_from >= header->eps). The counts, is_delta and
+ * from of the header are filled in. RQT_INVALID when patch is not what the walk over these blocks gives, or not
+ * finer than state. Equal patches give equal bytes. */
+rqt_status rqt_wire_encode(const rqt_wire_header *header, const rqt_block_number *numbers, size_t block_count,
+                           const rqt_patch *patch, const rqt_patch *state, const rqt_allocator *allocator,
+                           uint8_t *bytes, size_t *size);
+/* Header only; the checksum of all bytes is compared. */
+rqt_status rqt_wire_info(const uint8_t *bytes, size_t size, rqt_wire_header *header, rqt_message *message);
+/* bytes -> patch, to be released with rqt_patch_free. wants_leaves: fill patch->leaves, which increments need.
+ * Trusts nothing: any input gives RQT_OK, RQT_CORRUPT, RQT_INVALID for an increment, or RQT_NO_MEMORY; the memory
+ * taken is bounded by the size of the payload, which is at most 2^15 times that of the bytes. */
+rqt_status rqt_wire_decode(const uint8_t *bytes, size_t size, bool wants_leaves, const rqt_allocator *allocator,
+                           rqt_wire_header *header, rqt_patch *patch, rqt_message *message);
+/* The patch `state` (decoded with leaves, or the result of an apply) and its header, made finer by an increment.
+ * The new patch has leaves. RQT_INVALID with a sentence for an increment that belongs to another mesh. */
+rqt_status rqt_wire_apply(const rqt_wire_header *state_header, const rqt_patch *state, const uint8_t *bytes,
+                          size_t size, const rqt_allocator *allocator, rqt_wire_header *header, rqt_patch *patch,
+                          rqt_message *message);
+/* What an increment knows a mesh by: its vertices, their levels and heights, and its leaves, in their order. */
+uint64_t rqt_wire_digest(const rqt_patch *patch);
 
 #ifdef __cplusplus
 }

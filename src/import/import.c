@@ -269,6 +269,18 @@ static bool make_blocks(import_work *m) {
     return ok;
 }
 
+static bool minimal_progress(void *context, double done) {
+    const import_work *m = context;
+    return import_progress(&m->job, "minimal errors", done, sample_count(m));
+}
+
+static bool write_minimal(import_work *m) {
+    char *detail = NULL;
+    const int code = store_write_minimal(m->database.db, m->report->name, minimal_progress, m, &detail);
+    if (code == SQLITE_INTERRUPT) return false;
+    return code == SQLITE_OK || import_database_refuse(&m->job, code, detail);
+}
+
 /* File names, one a line. */
 static char *provenance(const import_work *m) {
     size_t size = 1;
@@ -294,6 +306,7 @@ static bool write_terrain(import_work *m, store_terrain *info) {
         if (code != SQLITE_OK) ok = import_database_refuse(job, code, detail);
     }
     store_writer_free(writer);
+    if (ok && job->options->minimal) ok = write_minimal(m);
     return ok && import_database_commit(job, &m->database);
 }
 

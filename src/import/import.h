@@ -19,6 +19,7 @@ typedef struct import_options {
     int jobs;         /* threads that work on the samples; another one reads */
     int64_t memory;   /* bytes that the import may take */
     bool replace;
+    bool minimal; /* store minimal errors, too */
     /* Progress: share 0..1 of one stage ("reading", "errors" - and blocks made of them -, "blocks" written);
      * samples of the whole. NULL: silent. False stops the import, which leaves the database as it was. */
     bool (*progress)(void *context, const char *stage, double done, int64_t samples);

@@ -4,16 +4,19 @@
  */
 #include "internal.h"
 
+#include <string.h>
+
 int store_block_bytes(store *s, const store_terrain *t, rqt_block_number number, const uint8_t **bytes, int *size,
                       char **error) {
     sqlite3_stmt **kept = &store_statements(s, t)->bytes;
     *bytes = NULL;
     *size = 0;
     if (!*kept) {
-        const int code = store_prepare(
-            s, t, kept,
-            sqlite3_mprintf("SELECT data, summary FROM \"%w\".rqt_block_%lld WHERE id = ?1", t->schema, t->id),
-            error);
+        const int code =
+            store_prepare(s, t, kept,
+                          sqlite3_mprintf("SELECT data, summary FROM \"%w\".rqt_block_%lld%s WHERE id = ?1",
+                                          t->schema, t->id, t->suffix),
+                          error);
         if (code != SQLITE_OK) return code;
     }
     sqlite3_reset(*kept);
@@ -30,6 +33,55 @@ int store_block_bytes(store *s, const store_terrain *t, rqt_block_number number,
     }
     sqlite3_reset(*kept);
     return store_fail(error, SQLITE_CORRUPT_VTAB, "terrain %s is damaged: block %llu is missing", t->name, number);
+}
+
+int store_get_summary(store *s, const store_terrain *t, rqt_block_number number, const rqt_summary **summary,
+                      char **error) {
+    const uint64_t key = (uint64_t)(t - s->terrains);
+    *summary = NULL;
+    if (!s->summaries) {
+        const sqlite3_uint64 bytes = SUMMARY_PLACES * sizeof *s->summaries;
+        s->summaries = sqlite3_malloc64(bytes);
+        if (!s->summaries) return SQLITE_NOMEM;
+        memset(s->summaries, 0, bytes);
+    }
+    kept_summary *kept = &s->summaries[(number ^ key * 2654435761U) % SUMMARY_PLACES];
+    if (kept->terrain == key + 1 && kept->number == number) {
+        *summary = &kept->summary;
+        return SQLITE_OK;
+    }
+    sqlite3_stmt **row = &store_statements(s, t)->summary;
+    int code = SQLITE_OK;
+    if (!*row)
+        code = store_prepare(s, t, row,
+                             sqlite3_mprintf("SELECT summary FROM \"%w\".rqt_block_%lld%s WHERE id = ?1", t->schema,
+                                             t->id, t->suffix),
+                             error);
+    if (code != SQLITE_OK) return code;
+    sqlite3_bind_int64(*row, 1, (sqlite3_int64)number);
+    code = sqlite3_step(*row);
+    if (code == SQLITE_ROW) {
+        const void *bytes = sqlite3_column_blob(*row, 0);
+        const int size = sqlite3_column_bytes(*row, 0);
+        kept->terrain = 0;
+        if (bytes && rqt_summary_decode(bytes, (size_t)size, &kept->summary) == RQT_OK) {
+            kept->terrain = key + 1;
+            kept->number = number;
+            *summary = &kept->summary;
+            s->has_summaries = true;
+            code = SQLITE_OK;
+        } else {
+            code = store_fail(error, SQLITE_CORRUPT_VTAB, "terrain %s is damaged: the summary of block %llu",
+                              t->name, number);
+        }
+    } else if (code == SQLITE_DONE) {
+        code =
+            store_fail(error, SQLITE_CORRUPT_VTAB, "terrain %s is damaged: block %llu is missing", t->name, number);
+    } else {
+        code = store_fail_db(error, s->db, code, "reading a block");
+    }
+    sqlite3_reset(*row);
+    return code;
 }
 
 /* What the block at hand in the statement lacks, out of its summary. */
@@ -95,8 +147,10 @@ static int window(store *s, const store_terrain *t, int32_t col, int32_t row, in
      */
     const int32_t last_i = t->lattice.width > 1 ? (t->lattice.width - 2) >> shift : 0;
     const int32_t last_j = t->lattice.height > 1 ? (t->lattice.height - 2) >> shift : 0;
-    for (int32_t j = row >> shift; j <= last_j && j << shift < row + height; j++) {
-        for (int32_t i = col >> shift; i <= last_i && i << shift < col + width; i++) {
+    const int32_t first_i = col >> shift < last_i ? col >> shift : last_i,
+                  first_j = row >> shift < last_j ? row >> shift : last_j;
+    for (int32_t j = first_j; j <= last_j && j << shift < row + height; j++) {
+        for (int32_t i = first_i; i <= last_i && i << shift < col + width; i++) {
             const rqt_block *block;
             int read;
             const int code = store_get_block(s, t, rqt_block_number_of(level, i, j), &block, &read, error);

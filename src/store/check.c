@@ -140,13 +140,32 @@ static bool is_kept(const rqt_block *b, size_t i) {
            (i % n % last == 0 && i / n % last == 0);
 }
 
+static bool is_root_corner(const rqt_lattice *lattice, rqt_vertex v) {
+    const int32_t side = 1 << lattice->K;
+    return (v.x == 0 || v.x == side) && (v.y == 0 || v.y == side);
+}
+
+static bool is_sample(const rqt_lattice *lattice, rqt_vertex v) {
+    return v.x < lattice->width && v.y < lattice->height;
+}
+
+/* Has a triangle with this vertex for a corner an area? They all lie within the largest power of two that divides
+ * both coordinates. Vertices without one, past the raster, have no error of their own. */
+static bool has_area(const rqt_lattice *lattice, rqt_vertex v) {
+    if (is_sample(lattice, v)) return true;
+    int32_t reach = 1;
+    while (reach < 1 << lattice->K && v.x % (2 * reach) == 0 && v.y % (2 * reach) == 0) reach *= 2;
+    return is_root_corner(lattice, v) || (v.x - reach < lattice->width - 1 && v.y - reach < lattice->height - 1);
+}
+
 /* n vertices of the frame's block (run a) beside those of another. Heights count where there are any. */
-static void compare(const frame *f, run a, run b, int32_t n, difference *d) {
+static void compare(const check *c, const frame *f, run a, run b, int32_t n, difference *d) {
     const int32_t side = (1 << f->block.k) + 1;
     for (int32_t i = 0; i < n; i++) {
         const int32_t u = a.u + i * a.du, v = a.v + i * a.dv;
         const size_t p = (size_t)(v * side + u), q = (size_t)((b.v + i * b.dv) * side + b.u + i * b.du);
         const rqt_vertex at = {f->place.x + u * f->place.stride, f->place.y + v * f->place.stride};
+        if (!has_area(&c->t->lattice, at)) continue;
         const bool kept = is_kept(a.block, p), kept_there = is_kept(b.block, q);
         if (!kept || !kept_there) {
             const rqt_code floor = kept ? b.block->floor : a.block->floor;
@@ -269,11 +288,6 @@ static const rqt_block *read_neighbour(check *c, rqt_block_number number, const 
 
 /* ------------------------------------------------------------------------------------------- inside one block */
 
-static bool is_root_corner(const rqt_lattice *lattice, rqt_vertex v) {
-    const int32_t side = 1 << lattice->K;
-    return (v.x == 0 || v.x == side) && (v.y == 0 || v.y == side);
-}
-
 /* The grid place of a lattice vertex in the frame's block, or -1. */
 static ptrdiff_t place_in(const frame *f, rqt_vertex v) {
     const int32_t dx = v.x - f->place.x, dy = v.y - f->place.y;
@@ -281,20 +295,8 @@ static ptrdiff_t place_in(const frame *f, rqt_vertex v) {
     return (ptrdiff_t)(dy / f->place.stride) * ((1 << f->block.k) + 1) + dx / f->place.stride;
 }
 
-static bool is_sample(const rqt_lattice *lattice, rqt_vertex v) {
-    return v.x < lattice->width && v.y < lattice->height;
-}
-
-/* Has a triangle with this vertex for a corner an area? They all lie within the largest power of two that divides
- * both coordinates. Vertices without one have no error. */
-static bool has_area(const rqt_lattice *lattice, rqt_vertex v) {
-    int32_t reach = 1;
-    while (reach < 1 << lattice->K && v.x % (2 * reach) == 0 && v.y % (2 * reach) == 0) reach *= 2;
-    return is_root_corner(lattice, v) || (v.x - reach < lattice->width - 1 && v.y - reach < lattice->height - 1);
-}
-
 typedef struct inside {
-    tally infinite, unsaturated, too_small, no_outline, past;
+    tally infinite, unsaturated, too_small, no_outline;
 } inside;
 
 /* One triangle that vertex m splits: apex p, its hypotenuse through m at a right angle to the way from m to p. Of
@@ -329,23 +331,19 @@ static void check_inside(check *c, frame *f) {
             if (!is_kept(&f->block, i)) continue;
             const bool root_corner = is_root_corner(lattice, at);
             if ((error == RQT_CODE_INFINITY) != root_corner) count(&found.infinite, at);
-            if (!is_sample(lattice, at) && (error || f->block.flags[i] & RQT_OUTLINE) && !has_area(lattice, at))
-                count(&found.past, at);
             if (error != RQT_CODE_INFINITY && error > c->max_error) c->max_error = error;
             rqt_vertex parents[2];
             for (int p = rqt_vertex_parents(lattice, at, parents); p-- > 0;) {
                 const ptrdiff_t above = place_in(f, parents[p]);
                 if (above < 0) continue;
                 const int outline = f->block.flags[i] & ~f->block.flags[above] & RQT_OUTLINE;
-                if ((f->block.error[above] < error || outline) &&
-                    (is_sample(lattice, parents[p]) || has_area(lattice, parents[p])))
+                if ((f->block.error[above] < error || outline) && has_area(lattice, parents[p]))
                     count(&found.unsaturated, parents[p]);
                 check_triangle(c, f, at, parents[p], &found);
             }
         }
     }
     tell_tally(c, f, &found.infinite, "has infinite errors elsewhere than at the root's corners, or not there");
-    tell_tally(c, f, &found.past, "has an error at a vertex past the raster, where no triangle has an area");
     tell_tally(c, f, &found.unsaturated, "has a vertex with less error or outline than one that depends on it");
     tell_tally(c, f, &found.too_small, "has an error smaller than what its vertex itself is off");
     tell_tally(c, f, &found.no_outline, "has a vertex between data and void without outline bit");
@@ -427,9 +425,9 @@ static void check_neighbours(check *c, const frame *f) {
         if (!other) continue;
         difference d = {0};
         if (south)
-            compare(f, (run){&f->block, 0, last, 1, 0}, (run){other, 0, 0, 1, 0}, last + 1, &d);
+            compare(c, f, (run){&f->block, 0, last, 1, 0}, (run){other, 0, 0, 1, 0}, last + 1, &d);
         else
-            compare(f, (run){&f->block, last, 0, 0, 1}, (run){other, 0, 0, 0, 1}, last + 1, &d);
+            compare(c, f, (run){&f->block, last, 0, 0, 1}, (run){other, 0, 0, 0, 1}, last + 1, &d);
         tell_difference(c, f, &d, south ? "its southern neighbour" : "its eastern neighbour", number);
     }
 }
@@ -440,7 +438,7 @@ static void check_parent(check *c, const frame *f, const frame *parent) {
     const int32_t u = f->place.i & 1 ? half : 0, v = f->place.j & 1 ? half : 0;
     difference d = {0};
     for (int32_t row = 0; row <= half; row++)
-        compare(f, (run){&f->block, 0, 2 * row, 2, 0}, (run){&parent->block, u, v + row, 1, 0}, half + 1, &d);
+        compare(c, f, (run){&f->block, 0, 2 * row, 2, 0}, (run){&parent->block, u, v + row, 1, 0}, half + 1, &d);
     tell_difference(c, f, &d, "its parent", parent->number);
 }
 
@@ -677,5 +675,6 @@ int store_check(store *s, const store_terrain *t, bool (*tell_one)(void *context
     if (c.row && !ended(&c)) visit(&c, 0, 0, 0);
     if (c.row && !ended(&c)) check_tables(&c);
     destroy(&c);
+    if (!ended(&c)) c.code = store_check_minimal(s, t, tell_one, context, error);
     return c.code;
 }

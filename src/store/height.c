@@ -49,9 +49,78 @@ static int full_height(store *s, const store_terrain *t, double col, double row,
     return SQLITE_OK;
 }
 
+/* On the plane of a triangle, counter-clockwise from its apex. */
+static double plane_height(const rqt_unit *unit, const rqt_leaf_corner leaf[3], double col, double row) {
+    const rqt_leaf_corner *a = &leaf[0], *b = &leaf[1], *c = &leaf[2];
+    const double area =
+        (double)(b->col - a->col) * (c->row - a->row) - (double)(c->col - a->col) * (b->row - a->row);
+    const double wb = ((col - a->col) * (c->row - a->row) - (c->col - a->col) * (row - a->row)) / area;
+    const double wc = ((b->col - a->col) * (row - a->row) - (col - a->col) * (b->row - a->row)) / area;
+    return metres_of(unit, a->q + wb * ((double)b->q - a->q) + wc * ((double)c->q - a->q));
+}
+
+/* The block of the place that answers: em falls from level to level, so the levels are searched by halves. Number 0
+ * where none does, in a damaged terrain. */
+static int find_answer(store *s, const store_terrain *t, int32_t x, int32_t y, rqt_code eps, rqt_outline outline,
+                       rqt_answer *answer, char **error) {
+    const int K = t->lattice.K;
+    int low = 0, high = K - t->k;
+    answer->number = 0;
+    while (low <= high) {
+        const int level = (low + high) / 2;
+        const rqt_block_number number = rqt_block_number_of(level, x >> (K - level), y >> (K - level));
+        const rqt_summary *summary;
+        const int code = store_get_summary(s, t, number, &summary, error);
+        if (code != SQLITE_OK) return code;
+        const rqt_interval *i = outline == RQT_OUTLINE_EXACT ? &summary->exact : &summary->tol;
+        if (i->em > eps) {
+            low = level + 1;
+        } else if (eps >= i->em_parent) {
+            high = level - 1;
+        } else {
+            *answer = (rqt_answer){number, *summary};
+            break;
+        }
+    }
+    return SQLITE_OK;
+}
+
+/* Straight to the leaf. RQT_FOUND_UNSURE: the patch has to say. */
+static int leaf_height(store *s, const store_terrain *t, double col, double row, double eps, rqt_found *what,
+                       double *metres, char **error) {
+    rqt_query query = {.lattice = t->lattice,
+                       .k = t->k,
+                       .eps = rqt_code_eps(eps, t->quantum_error),
+                       .select = RQT_SELECT_THRESHOLD,
+                       .outline = RQT_OUTLINE_EXACT};
+    const int32_t w = t->lattice.width, h = t->lattice.height;
+    int32_t x = (int32_t)col, y = (int32_t)row;
+    if (x > w - 2) x = w > 1 ? w - 2 : 0;
+    if (y > h - 2) y = h > 1 ? h - 2 : 0;
+    rqt_answer answer;
+    const rqt_block *block = NULL;
+    int read;
+    *what = RQT_FOUND_UNSURE;
+    int code = find_answer(s, t, x, y, query.eps, query.outline, &answer, error);
+    if (code != SQLITE_OK || answer.number == 0) return code;
+    if (rqt_summary_needs_block(&answer.summary, query.outline, query.eps))
+        code = store_get_block(s, t, answer.number, &block, &read, error);
+    if (code != SQLITE_OK) return code;
+    rqt_leaf_corner leaf[3];
+    *what = rqt_query_leaf_at(&query, &answer, block, (int64_t)(col * 0x1p20), (int64_t)(row * 0x1p20), leaf);
+    if (*what == RQT_FOUND_LEAF) *metres = plane_height(&t->unit, leaf, col, row);
+    return SQLITE_OK;
+}
+
 /* The plane of a triangle of the patch of the point. */
 static int mesh_height(store *s, const store_terrain *t, double x, double y, double col, double row, double eps,
                        double *metres, bool *found, char **error) {
+    rqt_found what;
+    int code = leaf_height(s, t, col, row, eps, &what, metres, error);
+    if (code != SQLITE_OK || what != RQT_FOUND_UNSURE) {
+        *found = code == SQLITE_OK && what == RQT_FOUND_LEAF;
+        return code;
+    }
     const uint32_t point = 1; /* also tells this machine's byte order, which the first byte of WKB names */
     uint8_t wkb[21] = {*(const uint8_t *)&point};
     memcpy(wkb + 1, &point, 4);
@@ -63,21 +132,20 @@ static int mesh_height(store *s, const store_terrain *t, double x, double y, dou
     rqt_status status = rqt_geometry_parse(wkb, sizeof wkb, false, store_allocator(), &geometry, &why);
     if (status == RQT_OK)
         status = rqt_region_create(geometry, &t->placement, &t->lattice, store_allocator(), &region);
-    int code = store_fail_core(error, status, "the point");
+    code = store_fail_core(error, status, "the point");
     rqt_patch patch = {0};
-    const store_query_options options = {RQT_SELECT_THRESHOLD, RQT_OUTLINE_EXACT};
+    const store_query_options options = {.select = RQT_SELECT_THRESHOLD, .outline = RQT_OUTLINE_EXACT};
     if (code == SQLITE_OK) code = store_query(s, t, region, eps, &options, &patch, NULL, error);
     if (code == SQLITE_OK && patch.triangle_count > 0) {
-        const rqt_patch_vertex *a = &patch.vertices[patch.triangles[0]], *b = &patch.vertices[patch.triangles[1]],
-                               *c = &patch.vertices[patch.triangles[2]];
-        const double area =
-            (double)(b->col - a->col) * (c->row - a->row) - (double)(c->col - a->col) * (b->row - a->row);
-        const double wb = ((col - a->col) * (c->row - a->row) - (c->col - a->col) * (row - a->row)) / area;
-        const double wc = ((b->col - a->col) * (row - a->row) - (col - a->col) * (b->row - a->row)) / area;
-        *metres = metres_of(&t->unit, a->q + wb * ((double)b->q - a->q) + wc * ((double)c->q - a->q));
+        rqt_leaf_corner leaf[3];
+        for (int c = 0; c < 3; c++) {
+            const rqt_patch_vertex *v = &patch.vertices[patch.triangles[c]];
+            leaf[c] = (rqt_leaf_corner){v->col, v->row, v->q};
+        }
+        *metres = plane_height(&t->unit, leaf, col, row);
         *found = true;
     }
-    rqt_patch_free(&patch);
+    store_keep(s, &patch);
     rqt_region_free(region);
     rqt_geometry_free(geometry);
     return code;

@@ -12,13 +12,21 @@
 
 typedef struct statements {
     sqlite3_stmt *answers[2]; /* by rqt_outline */
-    sqlite3_stmt *bytes;
+    sqlite3_stmt *bytes, *summary;
 } statements;
+
+/* Summaries by block number, as many as a terrain of 8193 x 8193 has at k = 6; what hits the same place goes. */
+#define SUMMARY_PLACES 16384
+typedef struct kept_summary {
+    uint64_t terrain; /* + 1; 0: nothing is here */
+    rqt_block_number number;
+    rqt_summary summary;
+} kept_summary;
 
 struct store {
     sqlite3 *db;
-    store_terrain *terrains;
-    statements *statements; /* one per terrain */
+    store_terrain *terrains; /* count as they are; then each again, as its minimal errors' tables have it */
+    statements *statements;  /* one for each of both */
     int count;
     bool known;                         /* terrains are read, and the cache holds only what is theirs */
     uint64_t version;                   /* of all databases, when they were read */
@@ -26,7 +34,12 @@ struct store {
     sqlite3_stmt *probe;                /* asks whether we are interrupted */
     int holders;                        /* calls of store_begin that have not ended */
     block_cache *cache;
+    rqt_scratch *scratch;    /* memory that queries hand on */
+    kept_summary *summaries; /* SUMMARY_PLACES, from the first use on */
+    bool has_summaries;      /* there is something in them */
     rqt_codec *codec;
+    struct method_cache *methods; /* what was computed, for one terrain; NULL: nothing */
+    size_t method_memory;
 };
 
 /* Set *error to a sentence and return code (SQLITE_NOMEM when there is no memory for the sentence). terrain.c */
@@ -54,8 +67,44 @@ int store_prepare(store *s, const store_terrain *t, sqlite3_stmt **out, char *sq
 /* The bytes of a block; valid until its statement is reset. blocks.c */
 int store_block_bytes(store *s, const store_terrain *t, rqt_block_number number, const uint8_t **bytes, int *size,
                       char **error);
+/* The summary of one block, kept. Valid until the next call. blocks.c */
+int store_get_summary(store *s, const store_terrain *t, rqt_block_number number, const rqt_summary **summary,
+                      char **error);
 /* The decoded block, from the cache or the database. *read: bytes read now, 0 when it was cached. blocks.c */
 int store_get_block(store *s, const store_terrain *t, rqt_block_number number, const rqt_block **block, int *read,
                     char **error);
+
+/* A query when its eps is a code. */
+typedef struct store_question {
+    const rqt_region *region;
+    rqt_code eps;
+    const store_query_options *options;
+    size_t most; /* vertices: with more, stop and say over; 0: any number */
+    bool over;
+} store_question;
+/* From the tables of t (metric is not looked at). query.c */
+int store_query_tables(store *s, const store_terrain *t, store_question *question, rqt_patch *patch,
+                       store_reads *reads, char **error);
+/* From errors in memory, computed first if need be. *largest, when not NULL: the largest finite code. methods.c */
+int store_query_computed(store *s, const store_terrain *t, store_question *question, rqt_patch *patch,
+                         store_reads *reads, rqt_code *largest, char **error);
+void store_methods_free(store *s);
+/* A row per answer of a query, as its summary has it. query.c */
+int store_begin_reads(const rqt_query *query, store_reads *reads);
+int64_t store_count_selected(const rqt_query *query, const rqt_block *block);
+/* Was sqlite3_interrupt called? *code says how to end. query.c */
+bool store_is_interrupted(store *s, int *code);
+
+#define STORE_MINIMAL "_minimal" /* suffix of the tables that hold minimal errors */
+/* A writer of those tables, beside a terrain of main that is complete. writer.c */
+int store_writer_beside(sqlite3 *db, const store_terrain *t, store_writer **writer, char **error);
+/* The pyramid over a metric's errors, computed now if need be; valid until the store forgets. methods.c */
+int store_take_pyramid(store *s, const store_terrain *t, rqt_metric metric, rqt_outline outline,
+                       const rqt_pyramid **pyramid, char **error);
+/* What rqt_check finds of the minimal errors of a terrain, as store_check. minimal.c */
+int store_check_minimal(store *s, const store_terrain *t, bool (*tell)(void *context, const store_finding *finding),
+                        void *context, char **error);
+/* The terrain as the tables of its minimal errors have it; NULL when it has none. minimal.c */
+const store_terrain *store_minimal(store *s, const store_terrain *t);
 
 #endif

@@ -15,10 +15,10 @@ static int answers_statement(store *s, const store_terrain *t, rqt_outline outli
         const char *column = outline == RQT_OUTLINE_TOL ? "tol" : "exact";
         code = store_prepare(
             s, t, kept,
-            sqlite3_mprintf("SELECT b.id, b.summary FROM \"%w\".rqt_index_%lld i "
-                            "CROSS JOIN \"%w\".rqt_block_%lld b ON b.id = i.id WHERE i.x1 >= ?1 AND i.x0 <= ?2 "
+            sqlite3_mprintf("SELECT b.id, b.summary FROM \"%w\".rqt_index_%lld%s i "
+                            "CROSS JOIN \"%w\".rqt_block_%lld%s b ON b.id = i.id WHERE i.x1 >= ?1 AND i.x0 <= ?2 "
                             "AND i.y1 >= ?3 AND i.y0 <= ?4 AND i.%s0 <= ?5 AND i.%s1 >= ?5",
-                            t->schema, t->id, t->schema, t->id, column, column),
+                            t->schema, t->id, t->suffix, t->schema, t->id, t->suffix, column, column),
             error);
     }
     *out = *kept;
@@ -93,12 +93,14 @@ typedef struct reading {
     const store_terrain *terrain;
     const rqt_query *query;
     store_reads *reads; /* may be NULL */
+    const rqt_patch *patch;
+    store_question *question;
     size_t next;
     char **error;
     int code;
 } reading;
 
-static int64_t count_selected(const rqt_query *query, const rqt_block *block) {
+int64_t store_count_selected(const rqt_query *query, const rqt_block *block) {
     const size_t n = ((size_t)1 << block->k) + 1;
     int64_t count = 0;
     for (size_t i = 0; i < n * n; i++)
@@ -108,7 +110,7 @@ static int64_t count_selected(const rqt_query *query, const rqt_block *block) {
 }
 
 /* A row per answer, as answered from its index row; the query has sorted them. */
-static int begin_reads(const rqt_query *query, store_reads *reads) {
+int store_begin_reads(const rqt_query *query, store_reads *reads) {
     reads->rows = sqlite3_malloc64((query->answer_count + 1) * sizeof *reads->rows);
     if (!reads->rows) return SQLITE_NOMEM;
     reads->count = query->answer_count;
@@ -118,7 +120,9 @@ static int begin_reads(const rqt_query *query, store_reads *reads) {
         for (int c = 0; c < 4; c++)
             selected += summary->corner[c].error > query->eps ||
                         (query->outline == RQT_OUTLINE_EXACT && (summary->corner[c].flags & RQT_OUTLINE));
-        reads->rows[i] = (store_read){query->answers[i].number, false, false, 0, selected};
+        const bool outside = !rqt_query_needs_block(query, &query->answers[i]) &&
+                             rqt_summary_needs_block(summary, query->outline, query->eps);
+        reads->rows[i] = (store_read){.number = query->answers[i].number, .outside = outside, .selected = selected};
     }
     return SQLITE_OK;
 }
@@ -131,7 +135,7 @@ static const rqt_block *read_block(void *context, rqt_block_number number) {
     if (r->code != SQLITE_OK) return NULL;
     if (r->reads) {
         /* Blocks come in the order of the answers, once, or twice when a selection is closed first. */
-        if (!r->reads->rows && (r->code = begin_reads(r->query, r->reads)) != SQLITE_OK) return NULL;
+        if (!r->reads->rows && (r->code = store_begin_reads(r->query, r->reads)) != SQLITE_OK) return NULL;
         while (r->reads->rows[r->next].number != number) r->next = (r->next + 1) % r->reads->count;
         store_read *row = &r->reads->rows[r->next];
         if (!row->needs_bytes) {
@@ -142,23 +146,32 @@ static const rqt_block *read_block(void *context, rqt_block_number number) {
                 sqlite3_reset(store_statements(r->store, r->terrain)->bytes);
                 if (r->code != SQLITE_OK) return NULL;
             }
-            *row = (store_read){number, true, read == 0, size, count_selected(r->query, block)};
+            *row = (store_read){.number = number,
+                                .needs_bytes = true,
+                                .cached = read == 0,
+                                .bytes = size,
+                                .selected = store_count_selected(r->query, block)};
         }
     }
     return block;
 }
 
-static bool is_interrupted(void *context) {
+bool store_is_interrupted(store *s, int *why) {
     /* SQLite 3.40 tells nobody that sqlite3_interrupt was called but a statement that runs: so run one. */
-    reading *r = context;
-    store *s = r->store;
     int code = SQLITE_OK;
     if (!s->probe) code = sqlite3_prepare_v3(s->db, "SELECT 1", -1, SQLITE_PREPARE_PERSISTENT, &s->probe, NULL);
     if (code == SQLITE_OK) code = sqlite3_step(s->probe);
     sqlite3_reset(s->probe);
     if (code == SQLITE_ROW) return false;
-    r->code = code & 0xFF;
+    *why = code & 0xFF;
     return true;
+}
+
+static bool is_interrupted(void *context) {
+    reading *r = context;
+    /* More than is wanted already: the rest need not be walked. */
+    r->question->over = r->question->most > 0 && r->patch->vertex_count > r->question->most;
+    return r->question->over || store_is_interrupted(r->store, &r->code);
 }
 
 void store_reads_free(store_reads *reads) {
@@ -166,35 +179,45 @@ void store_reads_free(store_reads *reads) {
     memset(reads, 0, sizeof *reads);
 }
 
-static int query(store *s, const store_terrain *t, const rqt_region *region, double eps,
-                 const store_query_options *options, rqt_patch *patch, store_reads *reads, char **error) {
+int store_query_tables(store *s, const store_terrain *t, store_question *question, rqt_patch *patch,
+                       store_reads *reads, char **error) {
+    const store_query_options *options = question->options;
+    const rqt_code code_eps = question->eps;
+    question->over = false;
     memset(patch, 0, sizeof *patch);
     if (reads) memset(reads, 0, sizeof *reads);
-    if (!(eps >= 0)) return store_fail(error, SQLITE_ERROR, "eps must be a number of metres, 0 or more");
     int32_t box[4];
-    if (!rqt_region_box(region, &box[0], &box[2], &box[1], &box[3])) return SQLITE_OK;
-    const rqt_code code_eps = rqt_code_eps(eps, t->quantum_error);
+    if (!rqt_region_box(question->region, &box[0], &box[2], &box[1], &box[3])) return SQLITE_OK;
     answer_list list = {0};
     char *sentence = NULL;
     int code = find_answers(s, t, box, options->outline, code_eps, &list, &sentence);
     if (code == SQLITE_OK) {
         rqt_query query = {.lattice = t->lattice,
                            .k = t->k,
-                           .region = region,
+                           .region = question->region,
                            .eps = code_eps,
                            .select = options->select,
                            .outline = options->outline,
+                           .wants_leaves = options->wants_leaves,
+                           .product = options->product,
+                           .scratch = s->scratch,
                            .answers = list.rows,
                            .answer_count = list.count,
                            .read_block = read_block,
                            .is_interrupted = is_interrupted};
-        reading r = {
-            .store = s, .terrain = t, .query = &query, .reads = reads, .error = &sentence, .code = SQLITE_OK};
+        reading r = {.store = s,
+                     .terrain = t,
+                     .query = &query,
+                     .reads = reads,
+                     .patch = patch,
+                     .question = question,
+                     .error = &sentence,
+                     .code = SQLITE_OK};
         query.context = &r;
         const rqt_status status = rqt_query_run(&query, store_allocator(), patch);
         code = status == RQT_READ_FAILED || status == RQT_INTERRUPTED ? r.code
                                                                       : store_fail_core(&sentence, status, "query");
-        if (code == SQLITE_OK && reads && !reads->rows) code = begin_reads(&query, reads);
+        if (code == SQLITE_OK && reads && !reads->rows && !question->over) code = store_begin_reads(&query, reads);
     }
     sqlite3_free(list.rows);
     if (code != SQLITE_OK && reads) store_reads_free(reads);
@@ -203,16 +226,5 @@ static int query(store *s, const store_terrain *t, const rqt_region *region, dou
         sentence = NULL;
     }
     sqlite3_free(sentence);
-    return code;
-}
-
-int store_query(store *s, const store_terrain *t, const rqt_region *region, double eps,
-                const store_query_options *options, rqt_patch *patch, store_reads *reads, char **error) {
-    memset(patch, 0, sizeof *patch);
-    if (reads) memset(reads, 0, sizeof *reads);
-    int code = store_begin_on(s, t, error);
-    if (code != SQLITE_OK) return code;
-    code = query(s, t, region, eps, options, patch, reads, error);
-    store_end(s);
     return code;
 }

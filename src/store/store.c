@@ -1,15 +1,17 @@
 /* store.c - what a connection keeps between calls, and how long it may.
  *
- * The rows of rqt_terrain, prepared statements per terrain, and a cache of decoded blocks. All of it is dropped as
- * soon as any database of the connection has changed: SQLite's data version sees commits of others and our own.
- * While this connection itself writes, nothing is kept from one call to the next, because a rollback would not
- * change the version back. During a call the databases are held as they are.
+ * The rows of rqt_terrain, prepared statements per terrain, and a cache of decoded blocks (at most 256 MiB). All of
+ * it is dropped as soon as any database of the connection has changed: SQLite's data version sees commits of others
+ * and our own. While this connection itself writes, nothing is kept from one call to the next, because a rollback
+ * would not change the version back. During a call the databases are held as they are.
  */
 #include "internal.h"
 
 #include <string.h>
 
-#define CACHE_BYTES ((size_t)64 << 20)
+#define CACHE_BYTES \
+    ((size_t)256 << 20) /* of decoded blocks: 36 million samples, a whole DEM of 4097 x 4097 twice */
+#define SCRATCH_BYTES ((size_t)64 << 20) /* of memory kept from query to query: about 2 million triangles */
 
 int store_fail_core(char **error, rqt_status status, const char *doing) {
     switch (status) {
@@ -34,8 +36,10 @@ int store_open(sqlite3 *db, store **out) {
     if (!s) return SQLITE_NOMEM;
     memset(s, 0, sizeof *s);
     s->db = db;
+    s->method_memory = STORE_METHOD_MEMORY;
     s->cache = block_cache_create(store_allocator(), CACHE_BYTES);
-    if (!s->cache || rqt_codec_create(store_allocator(), &s->codec) != RQT_OK) {
+    if (!s->cache || rqt_codec_create(store_allocator(), &s->codec) != RQT_OK ||
+        rqt_scratch_create(store_allocator(), &s->scratch) != RQT_OK) {
         store_close(s);
         return SQLITE_NOMEM;
     }
@@ -47,15 +51,20 @@ sqlite3 *store_connection(const store *s) {
     return s->db;
 }
 
+void store_keep(store *s, rqt_patch *patch) {
+    rqt_scratch_keep(s->scratch, patch, SCRATCH_BYTES);
+}
+
 static void finalize(statements *p) {
     sqlite3_finalize(p->answers[0]);
     sqlite3_finalize(p->answers[1]);
     sqlite3_finalize(p->bytes);
+    sqlite3_finalize(p->summary);
     memset(p, 0, sizeof *p);
 }
 
 static void finalize_all(store *s) {
-    for (int i = 0; i < s->count; i++) finalize(&s->statements[i]);
+    for (int i = 0; i < 2 * s->count; i++) finalize(&s->statements[i]);
 }
 
 void store_release(store *s) {
@@ -77,7 +86,10 @@ static void forget(store *s) {
     s->terrains = NULL;
     s->count = 0;
     s->known = false;
+    store_methods_free(s);
     block_cache_clear(s->cache);
+    if (s->has_summaries) memset(s->summaries, 0, SUMMARY_PLACES * sizeof *s->summaries);
+    s->has_summaries = false;
 }
 
 void store_close(store *s) {
@@ -86,6 +98,8 @@ void store_close(store *s) {
     if (s->cache) forget(s);
     block_cache_free(s->cache);
     rqt_codec_free(s->codec);
+    rqt_scratch_free(s->scratch);
+    sqlite3_free(s->summaries);
     sqlite3_free(s);
 }
 
@@ -156,9 +170,17 @@ static int refresh(store *s, char **error) {
     int code = store_read_terrains(s->db, &s->terrains, &s->count, error);
     if (code != SQLITE_OK) return code;
     if (s->count > 0) {
-        const sqlite3_uint64 bytes = (sqlite3_uint64)s->count * sizeof *s->statements;
+        const sqlite3_uint64 n = (sqlite3_uint64)s->count, bytes = 2 * n * sizeof *s->statements;
         s->statements = sqlite3_malloc64(bytes);
-        if (!s->statements) {
+        store_terrain *both = sqlite3_realloc64(s->terrains, 2 * n * sizeof *both);
+        if (both) {
+            s->terrains = both;
+            memcpy(both + n, both, n * sizeof *both);
+            for (sqlite3_uint64 i = n; i < 2 * n; i++) both[i].suffix = STORE_MINIMAL;
+        }
+        if (!s->statements || !both) {
+            sqlite3_free(s->statements);
+            s->statements = NULL;
             store_terrains_free(s->terrains, s->count);
             s->terrains = NULL;
             s->count = 0;

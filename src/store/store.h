@@ -46,6 +46,7 @@ typedef struct store_terrain {
     int32_t min_q, max_q;  /* of the valid samples; both 0 when there are none */
     int64_t blocks, bytes; /* of the block table: rows, and bytes of BLOBs and summaries */
     rqt_code max_error;    /* the largest finite error of any vertex */
+    const char *suffix;    /* of the names of its block table and index: "" (static) */
 } store_terrain;
 
 /* ---------------------------------------------------------------------------------------------- reading */
@@ -74,12 +75,17 @@ void store_terrains_free(store_terrain *terrains, int count);
 typedef struct store_query_options {
     rqt_select select;
     rqt_outline outline;
+    rqt_metric metric;   /* exact is what is stored; minimal may be; the others are computed, see methods.c */
+    rqt_product product; /* what the patch holds */
+    bool wants_leaves;   /* fill patch->leaves; with RQT_PRODUCT_TRIANGLES only */
 } store_query_options;
 
 /* One row per block that answered, in Morton order. */
 typedef struct store_read {
     rqt_block_number number;
     bool needs_bytes; /* false: answered from its index row alone */
+    bool computed;    /* not stored: made in memory from the heights of the whole terrain */
+    bool outside;     /* its cell only touches the region: nothing in it is asked for */
     bool cached;      /* its decoded bytes were in the cache */
     int64_t bytes;    /* of the BLOB, read now or before; 0 when not needed */
     int64_t selected; /* vertices of its grid that eps selects, corners of the block included */
@@ -93,6 +99,17 @@ void store_reads_free(store_reads *reads);
 /* The patch of region at eps (metres; checked here: NaN and negative are SQLITE_ERROR). reads may be NULL. */
 int store_query(store *s, const store_terrain *t, const rqt_region *region, double eps,
                 const store_query_options *options, rqt_patch *patch, store_reads *reads, char **error);
+/* The same within a budget: the mesh of the smallest eps' >= eps that has at most max_vertices (>= 4) vertices in
+ * the patch. *achieved: eps' in metres, eps itself when that fits. SQLITE_ERROR when even infinite eps needs more.
+ */
+int store_query_within(store *s, const store_terrain *t, const rqt_region *region, double eps,
+                       const store_query_options *options, int64_t max_vertices, double *achieved, rqt_patch *patch,
+                       store_reads *reads, char **error);
+/* Instead of rqt_patch_free: the store keeps the memory for its next query, up to a limit. */
+void store_keep(store *s, rqt_patch *patch);
+/* Memory that a metric which is not stored may take, heights included. */
+#define STORE_METHOD_MEMORY ((size_t)512 << 20)
+void store_limit_methods(store *s, size_t bytes);
 /* Full-resolution samples of a window inside the raster, for width*height values each, row by row. */
 int store_window(store *s, const store_terrain *t, int32_t col, int32_t row, int32_t width, int32_t height,
                  int32_t *q, uint8_t *valid, char **error);
@@ -128,6 +145,14 @@ int store_writer_block(store_writer *w, rqt_block_number number, const rqt_summa
 int store_writer_finish(store_writer *w, rqt_code max_error, char **error);
 /* Release, finished or not. */
 void store_writer_free(store_writer *w);
+
+/* Store the minimal errors of a terrain of main that is complete, so that queries need not compute them: in tables
+ * like its own (FORMAT.md, "Tables"), inside the caller's transaction. All heights are read back: what that takes
+ * (store_minimal_bytes) must be within STORE_METHOD_MEMORY, else SQLITE_ERROR with a sentence and nothing written.
+ * progress, when not NULL, returns false to stop (SQLITE_INTERRUPT; the caller rolls back). */
+int store_write_minimal(sqlite3 *db, const char *name, bool (*progress)(void *context, double done), void *context,
+                        char **error);
+size_t store_minimal_bytes(const rqt_lattice *lattice, int k, bool has_voids);
 
 /* Is this a name a terrain may have? */
 bool store_name_is_valid(const char *name);

@@ -91,6 +91,7 @@ static int unusable(store_terrain *t, const char *format, ...) {
 
 static int read_row(sqlite3_stmt *row, const char *schema, store_terrain *t) {
     memset(t, 0, sizeof *t);
+    t->suffix = "";
     const char *name = (const char *)sqlite3_column_text(row, 1);
     t->id = sqlite3_column_int64(row, 0);
     sqlite3_snprintf(sizeof t->schema, t->schema, "%s", schema);

@@ -12,6 +12,7 @@
 struct store_writer {
     sqlite3 *db;
     int64_t id;
+    const char *suffix; /* of the tables' names */
     int k;
     rqt_lattice lattice;
     int64_t blocks, bytes;
@@ -24,11 +25,11 @@ static int run(sqlite3 *db, const char *sql, char **error, const char *doing) {
     return code == SQLITE_OK ? SQLITE_OK : store_fail_db(error, db, code, doing);
 }
 
-/* sql with every {N} replaced by the terrain's id. */
-static char *with_id(const char *sql, int64_t id) {
+/* sql with every {N} replaced by the terrain's id and suffix. */
+static char *with_id(const char *sql, int64_t id, const char *suffix) {
     sqlite3_str *out = sqlite3_str_new(NULL);
     for (const char *hole; (hole = strstr(sql, "{N}")) != NULL; sql = hole + 3)
-        sqlite3_str_appendf(out, "%.*s%lld", (int)(hole - sql), sql, id);
+        sqlite3_str_appendf(out, "%.*s%lld%s", (int)(hole - sql), sql, id, suffix);
     sqlite3_str_appendall(out, sql);
     return sqlite3_str_finish(out);
 }
@@ -65,10 +66,13 @@ static int register_attributes(sqlite3 *db, const char *table, const char *ident
 static int drop_terrain(sqlite3 *db, int64_t id, char **error) {
     char *sql =
         sqlite3_mprintf("DROP TABLE IF EXISTS main.rqt_index_%lld; DROP TABLE IF EXISTS main.rqt_block_%lld; "
+                        "DROP TABLE IF EXISTS main.rqt_index_%lld%s; DROP TABLE IF EXISTS main.rqt_block_%lld%s; "
                         "DELETE FROM main.rqt_terrain WHERE id = %lld;",
-                        id, id, id);
+                        id, id, id, STORE_MINIMAL, id, STORE_MINIMAL, id);
     char *contents = has_table(db, "gpkg_contents")
-                         ? sqlite3_mprintf("DELETE FROM main.gpkg_contents WHERE table_name = 'rqt_block_%lld'", id)
+                         ? sqlite3_mprintf("DELETE FROM main.gpkg_contents WHERE table_name IN "
+                                           "('rqt_block_%lld', 'rqt_block_%lld%s')",
+                                           id, id, STORE_MINIMAL)
                          : sqlite3_mprintf("");
     int code = sql && contents ? run(db, sql, error, "replacing a terrain") : SQLITE_NOMEM;
     if (code == SQLITE_OK) code = run(db, contents, error, "replacing a terrain");
@@ -90,11 +94,33 @@ static int find_id(sqlite3 *db, const char *name, int64_t *id, char **error) {
 }
 
 static int prepare(store_writer *w, sqlite3_stmt **out, const char *format, char **error) {
-    char *sql = sqlite3_mprintf(format, w->id);
+    char *sql = sqlite3_mprintf(format, w->id, w->suffix);
     if (!sql) return SQLITE_NOMEM;
     const int code = sqlite3_prepare_v3(w->db, sql, -1, SQLITE_PREPARE_PERSISTENT, out, NULL);
     sqlite3_free(sql);
     return code == SQLITE_OK ? SQLITE_OK : store_fail_db(error, w->db, code, "preparing to write blocks");
+}
+
+/* The two tables, and the statements that fill them. */
+static int create_tables(store_writer *w, const store_terrain *info, const char *what, char **error) {
+    char *sql = with_id(sql_terrain, w->id, w->suffix);
+    int code = sql ? run(w->db, sql, error, "creating the terrain's tables") : SQLITE_NOMEM;
+    sqlite3_free(sql);
+    if (code == SQLITE_OK) {
+        char *table = sqlite3_mprintf("rqt_block_%lld%s", w->id, w->suffix);
+        char *about = sqlite3_mprintf("rqt: %s of terrain %s, %d x %d samples", what, info->name,
+                                      info->lattice.width, info->lattice.height);
+        code = table && about ? register_attributes(w->db, table, table, about, error) : SQLITE_NOMEM;
+        sqlite3_free(table);
+        sqlite3_free(about);
+    }
+    if (code == SQLITE_OK)
+        code = prepare(w, &w->put_block, "INSERT INTO main.rqt_block_%lld%s(id, summary, data) VALUES(?1, ?2, ?3)",
+                       error);
+    if (code == SQLITE_OK)
+        code = prepare(w, &w->put_index, "INSERT INTO main.rqt_index_%lld%s VALUES(?1,?2,?3,?4,?5,?6,?7,?8,?9)",
+                       error);
+    return code;
 }
 
 static int begin(store_writer *w, const store_terrain *info, bool replace, char **error) {
@@ -113,32 +139,28 @@ static int begin(store_writer *w, const store_terrain *info, bool replace, char 
     if (old) code = drop_terrain(w->db, old, error);
     if (code == SQLITE_OK) code = store_insert_terrain(w->db, info, &w->id, error);
     if (code != SQLITE_OK) return code;
-    char *sql = with_id(sql_terrain, w->id);
-    code = sql ? run(w->db, sql, error, "creating the terrain's tables") : SQLITE_NOMEM;
-    sqlite3_free(sql);
-    if (code == SQLITE_OK) {
-        char *table = sqlite3_mprintf("rqt_block_%lld", w->id);
-        char *about = sqlite3_mprintf("rqt: blocks of terrain %s, %d x %d samples", info->name, info->lattice.width,
-                                      info->lattice.height);
-        code = table && about ? register_attributes(w->db, table, table, about, error) : SQLITE_NOMEM;
-        sqlite3_free(table);
-        sqlite3_free(about);
-    }
-    if (code == SQLITE_OK)
-        code = prepare(w, &w->put_block, "INSERT INTO main.rqt_block_%lld(id, summary, data) VALUES(?1, ?2, ?3)",
-                       error);
-    if (code == SQLITE_OK)
-        code =
-            prepare(w, &w->put_index, "INSERT INTO main.rqt_index_%lld VALUES(?1,?2,?3,?4,?5,?6,?7,?8,?9)", error);
-    return code;
+    return create_tables(w, info, "blocks", error);
 }
 
 int store_writer_begin(sqlite3 *db, const store_terrain *info, bool replace, store_writer **writer, char **error) {
     *writer = NULL;
     store_writer *w = sqlite3_malloc(sizeof *w);
     if (!w) return SQLITE_NOMEM;
-    *w = (store_writer){.db = db, .k = info->k, .lattice = info->lattice};
+    *w = (store_writer){.db = db, .suffix = "", .k = info->k, .lattice = info->lattice};
     const int code = begin(w, info, replace, error);
+    if (code != SQLITE_OK)
+        store_writer_free(w);
+    else
+        *writer = w;
+    return code;
+}
+
+int store_writer_beside(sqlite3 *db, const store_terrain *t, store_writer **writer, char **error) {
+    *writer = NULL;
+    store_writer *w = sqlite3_malloc(sizeof *w);
+    if (!w) return SQLITE_NOMEM;
+    *w = (store_writer){.db = db, .id = t->id, .suffix = STORE_MINIMAL, .k = t->k, .lattice = t->lattice};
+    const int code = create_tables(w, t, "blocks with minimal errors", error);
     if (code != SQLITE_OK)
         store_writer_free(w);
     else

@@ -41,6 +41,13 @@ compile "$OUT/mirror_terrain" "" tests/bench/mirror_terrain.c
 compile "$OUT/bench" "$(gdal-config --cflags) -lsqlite3 $(gdal-config --libs) -lm" \
     tests/bench/bench.c tests/bench/bench_table.c
 
+walk_peer=
+if [[ -e $BUILD/librqt.a ]]; then
+    [[ ! $BUILD/librqt.a -nt $OUT/bench_walk ]] || rm -f "$OUT/bench_walk"
+    compile "$OUT/bench_walk" "-Isrc/core $BUILD/librqt.a -lzstd -lm" tests/bench/bench_walk.c tests/bench/bench_table.c
+    walk_peer=$OUT/bench_walk
+fi
+
 if [[ ! -e $raster || $OUT/make_terrain -nt $raster ]]; then
     echo "Generating $side x $side samples ..." >&2
     "$OUT/make_terrain" "$K" "$raster"
@@ -89,5 +96,10 @@ fi
 machine="$(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo | head -n 1), $(nproc) cores"
 data="generated fBm (H 0.9, seed 1), $side x $side int16, 30 m cells, 0 to 4000 m"
 "$OUT/bench" "$OUT/fbm.gpkg" "$RQT_SO" "$tiff" "$times" "$OUT/bench.csv" "$machine" "$data" "${large[@]}"
+if [[ $walk_peer ]]; then
+    echo
+    echo "The walk over decoded blocks in memory, one thread, beside RTIN's recursion in C over the same errors"
+    "$walk_peer" "$K" "$raster"
+fi
 echo
 echo "The same figures: $OUT/bench.csv"

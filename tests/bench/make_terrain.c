@@ -1,11 +1,13 @@
 /* make_terrain.c - terrain for the benches: fractional Brownian motion, the same bytes on every machine.
  *
- *     make_terrain K OUTPUT.bin [SEED]
+ *     make_terrain K OUTPUT.bin [SEED [NOISE [TOP]]]
  *
  * A square of (2^K + 1)^2 samples by midpoint displacement with successive random additions (every point of a
  * lattice is displaced again at every scale, which spares the creases of plain midpoint displacement), H = 0.9,
- * stretched to 0..4000 m and rounded to whole metres. Written as ENVI: raw little-endian int16 and a header beside
- * it; 30 m cells, UTM zone 32 north (EPSG:32632).
+ * stretched to 0..4000 m (or TOP) and rounded to whole metres. Written as ENVI: raw little-endian int16 and a
+ * header beside it; 30 m cells, UTM zone 32 north (EPSG:32632). With NOISE, in metres, every sample is moved by a
+ * random height of at most that much, each by its own (white noise, all heights equally likely), and heights are
+ * int32 centimetres.
  *
  * The same bytes everywhere: additions and multiplications of doubles in a fixed order (compile without fused
  * ones), no function of libm, noise from an integer hash of place and scale.
@@ -17,7 +19,7 @@
 #include <string.h>
 
 #define HALF_STEP 0.7320428479728127 /* 2^(-H/2): what a scale finer by sqrt(2) is weaker by */
-#define TOP 4000.0
+#define USUAL_TOP 4000.0
 #define CELL 30.0
 #define WEST 400000.0
 #define NORTH 5250000.0
@@ -26,6 +28,8 @@ typedef struct field {
     size_t n;  /* samples a side */
     double *z; /* n * n */
     uint64_t seed;
+    double noise; /* metres; less than 0: none, and whole metres */
+    double top;   /* metres of the highest sample; the lowest is at 0 */
 } field;
 
 static uint64_t mix(uint64_t h) {
@@ -91,6 +95,13 @@ static void make(field *f) {
     }
 }
 
+/* Centimetres of a height, with noise: between -noise and +noise from another hash than the terrain's. */
+static int32_t centimetres(const field *f, size_t place, double metres) {
+    const uint64_t h = mix(mix(f->seed + 1000) + (uint64_t)place * UINT64_C(0x9E3779B97F4A7C15));
+    const double random = (double)(h >> 11) * 0x1p-52 - 1;
+    return (int32_t)((metres + f->noise * random) * 100 + 100000.5) - 100000; /* noise goes below 0 */
+}
+
 static int write_samples(const field *f, const char *path) {
     const size_t count = f->n * f->n;
     double low = f->z[0], high = f->z[0];
@@ -98,17 +109,19 @@ static int write_samples(const field *f, const char *path) {
         if (f->z[i] < low) low = f->z[i];
         if (f->z[i] > high) high = f->z[i];
     }
-    const double stretch = TOP / (high - low);
-    unsigned char *row = malloc(2 * f->n);
+    const double stretch = f->top / (high - low);
+    const size_t size = f->noise < 0 ? 2 : 4;
+    unsigned char *row = malloc(size * f->n);
     FILE *out = row ? fopen(path, "wb") : NULL;
     int failed = !out;
     for (size_t y = 0; y < f->n && !failed; y++) {
         for (size_t x = 0; x < f->n; x++) {
-            const unsigned metres = (unsigned)((f->z[y * f->n + x] - low) * stretch + 0.5);
-            row[2 * x] = (unsigned char)(metres & 255);
-            row[2 * x + 1] = (unsigned char)(metres >> 8);
+            const double metres = (f->z[y * f->n + x] - low) * stretch;
+            const uint32_t value =
+                f->noise < 0 ? (uint32_t)(metres + 0.5) : (uint32_t)centimetres(f, y * f->n + x, metres);
+            for (size_t i = 0; i < size; i++) row[size * x + i] = (unsigned char)(value >> 8 * i & 255);
         }
-        failed = fwrite(row, 2, f->n, out) != f->n;
+        failed = fwrite(row, size, f->n, out) != f->n;
     }
     if (out && fclose(out)) failed = 1;
     free(row);
@@ -125,23 +138,28 @@ static int write_header(const field *f, const char *path) {
     snprintf(name, sizeof name, "%.*s.hdr", (int)(dot - path), path);
     FILE *out = fopen(name, "w");
     if (!out) return 1;
-    fprintf(
-        out,
-        "ENVI\ndescription = {fractional Brownian motion, H 0.9, seed %llu}\nsamples = %zu\nlines = %zu\n"
-        "bands = 1\nheader offset = 0\nfile type = ENVI Standard\ndata type = 2\ninterleave = bsq\nbyte order = 0\n"
-        "map info = {UTM, 1, 1, %.0f, %.0f, %.0f, %.0f, 32, North, WGS-84, units=Meters}\n",
-        (unsigned long long)f->seed, f->n, f->n, WEST, NORTH, CELL, CELL);
+    fprintf(out,
+            "ENVI\ndescription = {fractional Brownian motion, H 0.9, seed %llu}\nsamples = %zu\nlines = %zu\n"
+            "bands = 1\nheader offset = 0\nfile type = ENVI Standard\ndata type = %d\ninterleave = bsq\nbyte order "
+            "= 0\n"
+            "%smap info = {UTM, 1, 1, %.0f, %.0f, %.0f, %.0f, 32, North, WGS-84, units=Meters}\n",
+            (unsigned long long)f->seed, f->n, f->n, f->noise < 0 ? 2 : 3,
+            f->noise < 0 ? "" : "data gain values = {0.01}\n", WEST, NORTH, CELL, CELL);
     const int failed = ferror(out);
     return fclose(out) || failed;
 }
 
 int main(int argc, char **argv) {
-    const int k = argc == 3 || argc == 4 ? atoi(argv[1]) : 0;
+    const int k = argc >= 3 && argc <= 6 ? atoi(argv[1]) : 0;
     if (k < 1 || k > 15) {
-        fprintf(stderr, "Usage: make_terrain K OUTPUT.bin [SEED]; (2^K + 1)^2 samples, K from 1 to 15\n");
+        fprintf(stderr,
+                "Usage: make_terrain K OUTPUT.bin [SEED [NOISE [TOP]]]; (2^K + 1)^2 samples, K from 1 to 15\n");
         return 2;
     }
-    field f = {.n = ((size_t)1 << k) + 1, .seed = argc == 4 ? strtoull(argv[3], NULL, 10) : 1};
+    field f = {.n = ((size_t)1 << k) + 1,
+               .seed = argc >= 4 ? strtoull(argv[3], NULL, 10) : 1,
+               .noise = argc >= 5 ? strtod(argv[4], NULL) : -1,
+               .top = argc == 6 ? strtod(argv[5], NULL) : USUAL_TOP};
     f.z = calloc(f.n * f.n, sizeof *f.z);
     if (!f.z) {
         fprintf(stderr, "make_terrain: out of memory\n");

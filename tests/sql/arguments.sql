@@ -114,8 +114,8 @@ SELECT rqt_mesh(NULL, 1, 7);
 --! rqt_mesh(): 
 SELECT rqt_mesh(NULL, 1, 'glb');
 --! rqt_mesh(): format "glb" is not in this version
-SELECT rqt_mesh(NULL, 1, 'rqt');
---! rqt_mesh(): format "rqt" is not in this version
+SELECT typeof(rqt_mesh(NULL, 1, 'rqt')), hex(substr(rqt_mesh(NULL, 1, 'rqt'), 1, 5));
+--> blob|5251545701
 
 -- terrain
 SELECT * FROM rqt_range(NULL, 1, 'hill');

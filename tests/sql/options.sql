@@ -18,8 +18,46 @@ SELECT count(*) FROM rqt_triangles(NULL, 1, NULL, '{"strip":"bintree"}');
 --> 4
 SELECT count(*) FROM rqt_triangles(NULL, 1, NULL, '{"mode":"cover","outline":"exact","metric":"exact","select":"topdown","strip":"bintree"}');
 --> 4
+SELECT count(*) FROM rqt_triangles(NULL, 1, NULL, '{"metric":"minimal"}');
+--> 4
+SELECT count(*) FROM rqt_triangles(NULL, 1, NULL, '{"metric":"local"}');
+--> 4
+SELECT count(*) FROM rqt_triangles(NULL, 1, NULL, '{"metric":"wedgie"}');
+--> 4
+SELECT count(*) FROM rqt_triangles(NULL, 1, NULL, '{"metric":"euclid"}');
+--> 4
+SELECT count(*) FROM rqt_triangles(NULL, 1, NULL, '{"metric":"minimal","select":"topdown"}');
+--> 4
+SELECT count(*) FROM rqt_strip(NULL, 1, NULL, '{"strip":"fan"}');
+--> 8
+SELECT max_error <= 1, t_junctions, overlaps, uncovered FROM rqt_verify(NULL, 1, NULL, '{"metric":"wedgie"}');
+--> 1|0|0|0
+SELECT why LIKE '%made in memory%', bytes FROM rqt_explain(NULL, 1, NULL, '{"metric":"local"}') LIMIT 1;
+--> 1|0
 SELECT count(*) FROM rqt_triangles(NULL, 1, NULL, NULL);
 --> 4
+
+-- a budget: the smallest eps that keeps it
+SELECT count(*), max(achieved_eps) FROM rqt_range(NULL, 1, NULL, '{"max_vertices":5}');
+--> 5|1.0
+SELECT count(*), max(achieved_eps) FROM rqt_range(NULL, 1, NULL, '{"max_vertices":4}');
+--> 4|8.0
+SELECT count(*), max(achieved_eps) FROM rqt_triangles(NULL, 0.3, NULL, '{"max_vertices":4,"metric":"minimal"}');
+--> 2|8.0
+SELECT max(achieved_eps) FROM rqt_strip(NULL, 0.3, NULL, '{"max_vertices":1000}');
+--> 0.3
+SELECT max_error, vertices, achieved_eps FROM rqt_verify(NULL, 2, NULL, '{"max_vertices":4}');
+--> 8.0|4|8.0
+SELECT max(achieved_eps) FROM rqt_explain(NULL, 1, NULL, '{"max_vertices":4}');
+--> 8.0
+SELECT rqt_mesh(NULL, 0, 'indexed', NULL, '{"max_vertices":4}') = rqt_mesh(NULL, 8, 'indexed');
+--> 1
+SELECT * FROM rqt_range(NULL, 1, NULL, '{"max_vertices":3}');
+--! rqt_range(): option "max_vertices" must be an integer of 4 or more
+SELECT * FROM rqt_range(NULL, 1, NULL, '{"max_vertices":4.5}');
+--! rqt_range(): option "max_vertices" must be an integer of 4 or more
+SELECT * FROM rqt_range(NULL, 1, NULL, '{"max_vertices":"5"}');
+--! rqt_range(): option "max_vertices" must be an integer of 4 or more
 
 -- of the contract, not yet here
 SELECT * FROM rqt_range(NULL, 1, NULL, '{"mode":"snap"}');
@@ -30,20 +68,8 @@ SELECT * FROM rqt_verify(NULL, 1, NULL, '{"mode":"cut"}');
 --! rqt_verify(): option "mode":"cut" is not in this version
 SELECT rqt_mesh(NULL, 1, 'obj', NULL, '{"outline":"tol"}');
 --! rqt_mesh(): option "outline":"tol" is not in this version
-SELECT * FROM rqt_explain(NULL, 1, NULL, '{"metric":"minimal"}');
---! rqt_explain(): option "metric":"minimal" is not in this version
-SELECT * FROM rqt_triangles(NULL, 1, NULL, '{"metric":"local"}');
---! rqt_triangles(): option "metric":"local" is not in this version
-SELECT * FROM rqt_range(NULL, 1, NULL, '{"metric":"wedgie"}');
---! rqt_range(): option "metric":"wedgie" is not in this version
-SELECT * FROM rqt_strip(NULL, 1, NULL, '{"metric":"euclid"}');
---! rqt_strip(): option "metric":"euclid" is not in this version
-SELECT * FROM rqt_verify(NULL, 1, NULL, '{"strip":"fan"}');
---! rqt_verify(): option "strip":"fan" is not in this version
 SELECT rqt_mesh(NULL, 1, 'obj', NULL, '{"detail":5}');
 --! rqt_mesh(): option "detail" is not in this version
-SELECT * FROM rqt_explain(NULL, 1, NULL, '{"max_vertices":100}');
---! rqt_explain(): option "max_vertices" is not in this version
 SELECT * FROM rqt_triangles(NULL, 1, NULL, '{"max_triangles":100}');
 --! rqt_triangles(): option "max_triangles" is not in this version
 SELECT * FROM rqt_range(NULL, 1, NULL, '{"previous":"x"}');

@@ -1,0 +1,163 @@
+/* wire.c - what is around the walk of the wire format: the header, worst cases, and the digest by which an
+ * increment knows the mesh that it begins from. FORMAT.md, "Wire". */
+#include "wire_walk.h"
+
+#include <math.h>
+#include <zstd.h>
+
+enum {
+    AT_VERSION = 4,
+    AT_KIND = 5,
+    AT_K = 6,
+    AT_ZERO = 7,
+    AT_CHECKSUM = 8,
+    AT_VERTEX_COUNT = 16,
+    AT_TRIANGLE_COUNT = 24,
+    AT_PLACEMENT = 32,
+    AT_Z0 = 64,
+    AT_D = 72,
+    AT_NUMERATOR = 76,
+    AT_DENOMINATOR = 80,
+    AT_SRID = 84,
+    AT_SCALE = 88,
+    AT_OFFSET = 96,
+    AT_EPS = 104,
+    AT_WIDTH = 112,
+    AT_HEIGHT = 116,
+    AT_PAYLOAD = 120,
+    AT_EPS_FROM = 128,
+    AT_FROM = 136,
+
+    KIND_MESH = 1,
+    KIND_DELTA = 2,
+
+    ZSTD_BLOCK = 1 << 17, /* what the least zstd block, of 4 bytes, can stand for */
+    LEAST_ZSTD_BLOCK = 4
+};
+
+static rqt_status corrupt(rqt_message *message, const char *sentence) {
+    sentence_begin(message, sentence);
+    return RQT_CORRUPT;
+}
+
+size_t wire_slack(int k) {
+    const size_t n = ((size_t)1 << k) + 1;
+    return 4 * n * n + 64; /* of the bits after tokens at most 29 a place; of all others at most one byte */
+}
+
+void wire_put_header(const rqt_wire_header *h, uint64_t payload, uint8_t *bytes) {
+    memset(bytes, 0, RQT_WIRE_HEADER_BYTES);
+    memcpy(bytes, "RQTW", 4);
+    bytes[AT_VERSION] = RQT_FORMAT_VERSION;
+    bytes[AT_KIND] = h->is_delta ? KIND_DELTA : KIND_MESH;
+    bytes[AT_K] = (uint8_t)h->k;
+    put64(bytes + AT_VERTEX_COUNT, h->vertex_count);
+    put64(bytes + AT_TRIANGLE_COUNT, h->triangle_count);
+    put_double(bytes + AT_PLACEMENT, h->placement.x0);
+    put_double(bytes + AT_PLACEMENT + 8, h->placement.y0);
+    put_double(bytes + AT_PLACEMENT + 16, h->placement.dx);
+    put_double(bytes + AT_PLACEMENT + 24, h->placement.dy);
+    put64(bytes + AT_Z0, (uint64_t)h->unit.z0);
+    put32(bytes + AT_D, (uint32_t)h->unit.d);
+    put32(bytes + AT_NUMERATOR, (uint32_t)h->unit.numerator);
+    put32(bytes + AT_DENOMINATOR, (uint32_t)h->unit.denominator);
+    put32(bytes + AT_SRID, (uint32_t)h->srid);
+    put_double(bytes + AT_SCALE, h->unit.scale);
+    put_double(bytes + AT_OFFSET, h->unit.offset);
+    put_double(bytes + AT_EPS, h->eps);
+    put32(bytes + AT_WIDTH, (uint32_t)h->lattice.width);
+    put32(bytes + AT_HEIGHT, (uint32_t)h->lattice.height);
+    put64(bytes + AT_PAYLOAD, payload);
+    if (h->is_delta) {
+        put_double(bytes + AT_EPS_FROM, h->eps_from);
+        put64(bytes + AT_FROM, h->from);
+    }
+}
+
+uint64_t wire_payload_of(const uint8_t *bytes) {
+    return get64(bytes + AT_PAYLOAD);
+}
+
+static void get_header(const uint8_t *bytes, rqt_wire_header *h) {
+    *h = (rqt_wire_header){.is_delta = bytes[AT_KIND] == KIND_DELTA,
+                           .k = bytes[AT_K],
+                           .vertex_count = get64(bytes + AT_VERTEX_COUNT),
+                           .triangle_count = get64(bytes + AT_TRIANGLE_COUNT),
+                           .placement = {get_double(bytes + AT_PLACEMENT), get_double(bytes + AT_PLACEMENT + 8),
+                                         get_double(bytes + AT_PLACEMENT + 16),
+                                         get_double(bytes + AT_PLACEMENT + 24)},
+                           .unit = {.z0 = (int64_t)get64(bytes + AT_Z0),
+                                    .d = (int32_t)get32(bytes + AT_D),
+                                    .numerator = (int32_t)get32(bytes + AT_NUMERATOR),
+                                    .denominator = (int32_t)get32(bytes + AT_DENOMINATOR),
+                                    .scale = get_double(bytes + AT_SCALE),
+                                    .offset = get_double(bytes + AT_OFFSET)},
+                           .eps = get_double(bytes + AT_EPS),
+                           .srid = (int32_t)get32(bytes + AT_SRID),
+                           .eps_from = get_double(bytes + AT_EPS_FROM),
+                           .from = get64(bytes + AT_FROM)};
+}
+
+rqt_status rqt_wire_info(const uint8_t *bytes, size_t size, rqt_wire_header *header, rqt_message *message) {
+    memset(header, 0, sizeof *header);
+    if (size < RQT_WIRE_HEADER_BYTES) return corrupt(message, "not a mesh in wire format: it is too short");
+    if (memcmp(bytes, "RQTW", 4) != 0)
+        return corrupt(message, "not a mesh in wire format: it does not begin with RQTW");
+    if (bytes[AT_VERSION] != RQT_FORMAT_VERSION) return corrupt(message, "a mesh of unknown format version");
+    if ((bytes[AT_KIND] != KIND_MESH && bytes[AT_KIND] != KIND_DELTA) || bytes[AT_ZERO] != 0)
+        return corrupt(message, "the mesh is neither whole nor an increment");
+    if (get64(bytes + AT_CHECKSUM) != checksum64(bytes, size, AT_CHECKSUM))
+        return corrupt(message, "the mesh's checksum is wrong: its bytes have changed");
+    rqt_wire_header h;
+    get_header(bytes, &h);
+    const rqt_placement *p = &h.placement;
+    const uint32_t width = get32(bytes + AT_WIDTH), height = get32(bytes + AT_HEIGHT);
+    if (rqt_lattice_init(&h.lattice, width, height) != RQT_OK || h.k > h.lattice.K || h.k > RQT_MAX_BLOCK_K)
+        return corrupt(message, "the mesh's raster has an impossible size");
+    if (!isfinite(p->x0) || !isfinite(p->y0) || !isfinite(p->dx) || !isfinite(p->dy) || p->dx == 0 || p->dy == 0)
+        return corrupt(message, "the mesh's placement is not one");
+    if (!rqt_unit_is_valid(&h.unit)) return corrupt(message, "the mesh's unit of height is not one");
+    if (!(h.eps >= 0) || !(h.eps_from >= 0) || (h.is_delta ? h.eps_from < h.eps : h.eps_from != 0 || h.from != 0))
+        return corrupt(message, "the mesh's eps is not one");
+    const uint8_t *frame = bytes + RQT_WIRE_HEADER_BYTES;
+    const size_t room = size - RQT_WIRE_HEADER_BYTES;
+    const uint64_t payload = wire_payload_of(bytes);
+    if (room < 4 || get32(frame) != ZSTD_MAGICNUMBER || ZSTD_findFrameCompressedSize(frame, room) != room ||
+        ZSTD_getFrameContentSize(frame, room) != payload || payload / ZSTD_BLOCK > room / LEAST_ZSTD_BLOCK)
+        return corrupt(message, "the mesh's compressed bytes are cut off, or not what follows its header");
+    if (h.vertex_count >= WIRE_CLOCKWISE || h.triangle_count >= WIRE_CLOCKWISE)
+        return corrupt(message, "the mesh has more vertices or triangles than indices reach");
+    *header = h;
+    sentence_begin(message, "");
+    return RQT_OK;
+}
+
+size_t rqt_wire_bound(size_t vertex_count, size_t triangle_count, size_t block_count) {
+    /* A height: token and 29 bits. A triangle: on the way down to it at most one symbol a level of its block, a
+     * byte or a bit. A block: on the way down four symbols a level, if no other shares them. */
+    const size_t payload = WIRE_DIRECTORY + WIRE_STREAMS + 5 * vertex_count +
+                           triangle_count * (2 * RQT_MAX_BLOCK_K + 1) * 9 / 8 + block_count * (4 * RQT_MAX_K + 1) +
+                           1;
+    return RQT_WIRE_HEADER_BYTES + ZSTD_COMPRESSBOUND(payload) + 4 * WIRE_STREAMS;
+}
+
+static inline uint64_t fold(uint64_t h, uint32_t high, uint32_t low) {
+    const uint64_t v = (h ^ ((uint64_t)high << 32 | low)) * 0xC2B2AE3D27D4EB4FU;
+    return v << 29 | v >> 35;
+}
+
+uint64_t rqt_wire_digest(const rqt_patch *patch) {
+    uint64_t h = 0x9E3779B97F4A7C15U ^ (uint64_t)patch->vertex_count * 0xFF51AFD7ED558CCDU;
+    for (size_t i = 0; i < patch->vertex_count; i++) {
+        const rqt_patch_vertex *v = &patch->vertices[i];
+        h = fold(h, (uint32_t)v->row, (uint32_t)v->col);
+        h = fold(h, v->level, (uint32_t)v->q);
+    }
+    for (size_t t = 0; patch->leaves && t < patch->triangle_count; t++) {
+        const rqt_triangle *leaf = &patch->leaves[t];
+        h = fold(h, (uint32_t)leaf->apex.y, (uint32_t)leaf->apex.x);
+        h = fold(h, (uint32_t)leaf->left.y, (uint32_t)leaf->left.x);
+    }
+    h = (h ^ h >> 32) * 0xFF51AFD7ED558CCDU;
+    return h ^ h >> 29;
+}
