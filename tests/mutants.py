@@ -16,7 +16,7 @@ MUTANTS = [
      "if (d > most) most = d;", "if (d > most && y > y0) most = d;",
      "test_core_lattice", "errors_equal_the_oracles_on_adversarial_surfaces"),
     ("bound: 32 bits where they are too few", "src/core/deviation.c",
-     "INT64_C(1) << (29 - (m < 29 ? m : 29))", "INT64_C(1) << (33 - (m < 29 ? m : 29))",
+     "INT64_C(1) << (31 - (m < 31 ? m : 31))", "INT64_C(1) << (34 - (m < 31 ? m : 31))",
      "test_core_lattice", "errors_equal_the_oracles_on_adversarial_surfaces"),
     ("bound: the plane tilts the wrong way", "src/core/deviation.c", "        if (a.y == box->y0) gy = -gy;\n", "",
      "test_core_lattice", "a_plane_has_no_error_anywhere"),

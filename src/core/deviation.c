@@ -43,38 +43,49 @@ plane_triangle triangle_of_samples(const deviation_field *s, const rqt_triangle 
 
 /* -------------------------------------------------------------------------- inside the raster, without voids */
 
-typedef struct row_span {
-    int32_t x0, x1;
-} row_span;
-
-/* The samples of row y in a triangle that is not clamped. x0..y1 is its box. */
-static row_span span_of(const rqt_triangle *t, const sample_window *box, int32_t y) {
-    const int32_t from_top = y - box->y0, from_bottom = box->y1 - y;
-    row_span out = {box->x0, box->x1};
-    if (t->left.x != t->right.x && t->left.y != t->right.y) {
-        /* Legs on axes: full beside the apex, one sample at the far end of the vertical leg. */
-        const int32_t cut = t->apex.y == box->y0 ? from_top : from_bottom;
-        if (t->apex.x == box->x0)
-            out.x1 -= cut;
-        else
-            out.x0 += cut;
-    } else if (t->left.y == t->right.y) {
-        const int32_t cut = t->apex.y == box->y0 ? from_bottom : from_top;
-        out.x0 += cut;
-        out.x1 -= cut;
-    } else {
-        const int32_t reach = smaller(from_top, from_bottom);
-        if (t->apex.x == box->x0)
-            out.x0 = box->x1 - reach;
-        else
-            out.x1 = box->x0 + reach;
-    }
-    return out;
-}
-
 static sample_window box_of(rqt_vertex a, rqt_vertex l, rqt_vertex r) {
     return (sample_window){smaller(smaller(a.x, l.x), r.x), smaller(smaller(a.y, l.y), r.y),
                            larger(larger(a.x, l.x), r.x), larger(larger(a.y, l.y), r.y)};
+}
+
+/* The rows of a triangle that is not clamped, in a window: one piece, or two where its hypotenuse is upright. */
+static int spans_of(const rqt_triangle *t, const sample_window *box, const sample_window *window, int32_t y[2],
+                    row_spans out[2]) {
+    const bool upright = t->left.x == t->right.x, west = t->apex.x == box->x0, north = t->apex.y == box->y0;
+    const int32_t half = (box->y1 - box->y0) / 2;
+    int pieces = 0;
+    for (int piece = 0; piece <= upright; piece++) {
+        int32_t first = piece ? box->y0 + half + 1 : box->y0, last = upright && !piece ? box->y0 + half : box->y1;
+        row_spans s = {0, box->x0, 0, box->x1, 0, window->x0, window->x1};
+        if (upright) { /* wider towards the middle */
+            const int32_t at = piece ? half - 1 : 0, step = piece ? -1 : 1;
+            if (west)
+                s.left = box->x1 - at, s.left_step = -step;
+            else
+                s.right = box->x0 + at, s.right_step = step;
+        } else if (t->left.y == t->right.y) { /* one sample at the apex, all at the other end */
+            const int32_t cut = north ? box->y1 - box->y0 : 0, step = north ? -1 : 1;
+            s.left += cut, s.left_step = step;
+            s.right -= cut, s.right_step = -step;
+        } else { /* legs on axes: all beside the apex, one sample at the far end of the vertical leg */
+            const int32_t cut = north ? 0 : box->y1 - box->y0, step = north ? 1 : -1;
+            if (west)
+                s.right -= cut, s.right_step = -step;
+            else
+                s.left += cut, s.left_step = step;
+        }
+        if (first < window->y0) {
+            s.left += (window->y0 - first) * s.left_step;
+            s.right += (window->y0 - first) * s.right_step;
+            first = window->y0;
+        }
+        last = smaller(last, window->y1);
+        if (first > last) continue;
+        s.rows = last - first + 1;
+        y[pieces] = first;
+        out[pieces++] = s;
+    }
+    return pieces;
 }
 
 /* Gradients of a plane times 2^m. */
@@ -115,18 +126,19 @@ static uint64_t plane_deviation(const deviation_field *s, const plane_triangle *
     const slopes g = slopes_of(p, &box);
     const int m = g.m;
     *shift = m;
-    const bool narrow = s->relief < (INT64_C(1) << (29 - (m < 29 ? m : 29)));
+    const bool narrow = s->relief < (INT64_C(1) << (31 - (m < 31 ? m : 31)));
+    row_spans spans[2];
+    int32_t first[2];
     uint64_t most = 0;
-    const int32_t y0 = larger(box.y0, window->y0), y1 = smaller(box.y1, window->y1);
-    for (int32_t y = y0; y <= y1; y++) {
-        const row_span span = span_of(&p->t, &box, y);
-        const int32_t xa = larger(span.x0, window->x0), xb = smaller(span.x1, window->x1);
-        if (xa > xb) continue;
-        const int32_t *z = s->q + sample_index(s, xa, y);
-        const int64_t start = g.gx * (xa - a.x) + g.gy * (y - a.y);
+    const int pieces = spans_of(&p->t, &box, window, first, spans);
+    for (int i = 0; i < pieces; i++) {
+        const int32_t *z = s->q + sample_index(s, 0, first[i]);
+        const size_t stride = (size_t)s->width;
+        /* times 2^m, at column 0 of the first row */
+        const int64_t start = p->apex * ((int64_t)1 << m) - g.gx * a.x + g.gy * (first[i] - a.y);
         const uint64_t d =
-            narrow ? s->kernels->row_32(z, xb - xa + 1, (uint32_t)p->apex, m, (uint32_t)start, (uint32_t)g.gx)
-                   : s->kernels->row_64(z, xb - xa + 1, p->apex, m, start, g.gx);
+            narrow ? s->kernels->rows_32(z, stride, &spans[i], m, (uint32_t)start, (uint32_t)g.gx, (uint32_t)g.gy)
+                   : s->kernels->rows_64(z, stride, &spans[i], m, start, g.gx, g.gy);
         if (d > most) most = d;
     }
     return most;
@@ -135,19 +147,26 @@ static uint64_t plane_deviation(const deviation_field *s, const plane_triangle *
 /* What samples there are in the window of a triangle that is not clamped. */
 static int state_in(const deviation_field *s, const rqt_triangle *t, const sample_window *window) {
     const sample_window box = box_of(t->apex, t->left, t->right);
-    const int32_t y0 = larger(box.y0, window->y0), y1 = smaller(box.y1, window->y1);
+    row_spans spans[2];
+    int32_t first[2];
     int state = 0;
-    for (int32_t y = y0; y <= y1 && state != (HAS_VALID | HAS_VOID); y++) {
-        const row_span span = span_of(t, &box, y);
-        const int32_t xa = larger(span.x0, window->x0), xb = smaller(span.x1, window->x1);
-        if (xa > xb) continue;
-        if (!s->valid) return HAS_VALID;
-        const uint8_t *valid = s->valid + sample_index(s, xa, y);
-        if (memchr(valid, 0, (size_t)(xb - xa + 1))) state |= HAS_VOID;
-        if (memchr(valid, 1, (size_t)(xb - xa + 1))) state |= HAS_VALID;
-    }
+    const int pieces = spans_of(t, &box, window, first, spans);
+    for (int i = 0; i < pieces; i++)
+        for (int32_t k = 0; k < spans[i].rows && state != (HAS_VALID | HAS_VOID); k++) {
+            const int32_t xa = larger(spans[i].left + k * spans[i].left_step, window->x0);
+            const int32_t xb = smaller(spans[i].right + k * spans[i].right_step, window->x1);
+            if (xa > xb) continue;
+            if (!s->valid) return HAS_VALID;
+            const uint8_t *valid = s->valid + sample_index(s, xa, first[i] + k);
+            if (memchr(valid, 0, (size_t)(xb - xa + 1))) state |= HAS_VOID;
+            if (memchr(valid, 1, (size_t)(xb - xa + 1))) state |= HAS_VALID;
+        }
     return state;
 }
+
+typedef struct row_span {
+    int32_t x0, x1;
+} row_span;
 
 /* ------------------------------------------------------------------------------------ any triangle at all */
 

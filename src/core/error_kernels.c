@@ -1,36 +1,63 @@
-/* error_kernels.c - the inner loops of exact errors.
+/* error_kernels.c - the inner loops of exact errors, twice: for AVX2, and for any processor.
  *
- * One text, compiled for the plain processor and for AVX2. Every operation is one on integers, or on doubles that
- * are integers below 2^53, so both give the same results.
+ * One text, in the vector types of the compiler; what they have no operator for is a macro here. All of it is
+ * arithmetic on integers, on doubles that are integers below 2^53, and on floats whose error is allowed for: both
+ * versions give the same bytes.
  */
 #include "error_kernels.h"
 
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(RQT_SCALAR)
-#define HAVE_AVX2_KERNELS 1
-#endif
+#include <math.h>
+
+#define LANES 8
+typedef int32_t lanes_i __attribute__((vector_size(4 * LANES)));
+typedef uint32_t lanes_u __attribute__((vector_size(4 * LANES)));
+typedef float lanes_f __attribute__((vector_size(4 * LANES)));
 
 #define NAME(x) x##_plain
-#define ATTRIBUTES
+#define LANES_ABS(a) ((lanes_u)(((a) ^ ((a) >> 31)) - ((a) >> 31)))
+#define LANES_MAX(a, b) max_plain(a, b)
+static inline __attribute__((always_inline)) lanes_u max_plain(lanes_u a, lanes_u b) {
+    const lanes_u greater = (lanes_u)((lanes_i)a > (lanes_i)b); /* both below 2^31 */
+    return (a & greater) | (b & ~greater);
+}
+static inline __attribute__((always_inline)) bool any_plain(lanes_u a) {
+    uint32_t any = 0;
+    for (int i = 0; i < LANES; i++) any |= a[i];
+    return any != 0;
+}
+#define LANES_ANY(a) any_plain(a)
 #include "error_kernels_rows.h"
-#undef NAME
-#undef ATTRIBUTES
 
-#ifdef HAVE_AVX2_KERNELS
-#define NAME(x) x##_avx2
-#define ATTRIBUTES __attribute__((target("avx2")))
-#include "error_kernels_rows.h"
+#include "error_kernels_cells.h"
 #undef NAME
-#undef ATTRIBUTES
+#undef LANES_ABS
+#undef LANES_MAX
+#undef LANES_ANY
+
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(RQT_SCALAR)
+#include <immintrin.h>
+#define HAVE_AVX2_KERNELS 1
+#pragma GCC push_options
+#pragma GCC target("avx2")
+#define NAME(x) x##_avx2
+#define LANES_ABS(a) ((lanes_u)_mm256_abs_epi32((__m256i)(a)))
+#define LANES_MAX(a, b) ((lanes_u)_mm256_max_epi32((__m256i)(a), (__m256i)(b)))
+#define LANES_ANY(a) (!_mm256_testz_si256((__m256i)(a), (__m256i)(a)))
+#define LANES_AVX2 1
+#include "error_kernels_rows.h"
+
+#include "error_kernels_cells.h"
+#pragma GCC pop_options
 #endif
 
 const error_kernels *error_kernels_plain(void) {
-    static const error_kernels plain = {row_32_plain, row_64_plain, row_double_plain};
+    static const error_kernels plain = {rows_32_plain, rows_64_plain, row_double_plain, cells_plain};
     return &plain;
 }
 
 const error_kernels *error_kernels_best(void) {
 #ifdef HAVE_AVX2_KERNELS
-    static const error_kernels avx2 = {row_32_avx2, row_64_avx2, row_double_avx2};
+    static const error_kernels avx2 = {rows_32_avx2, rows_64_avx2, row_double_avx2, cells_avx2};
     if (__builtin_cpu_supports("avx2")) return &avx2;
 #endif
     return error_kernels_plain();

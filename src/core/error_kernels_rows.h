@@ -1,30 +1,79 @@
-/* error_kernels_rows.h - one row of one plane; compilers turn these loops into vector code. */
+/* error_kernels_rows.h - large triangles, row by row. Included by error_kernels.c once for each processor. */
 
-ATTRIBUTES static uint32_t NAME(row_32)(const int32_t *z, int32_t n, uint32_t base, int m, uint32_t start,
-                                        uint32_t slope) {
-    uint32_t most = 0;
-    for (int32_t i = 0; i < n; i++) {
-        const int32_t d = (int32_t)((((uint32_t)z[i] - base) << m) - start - (uint32_t)i * slope);
-        const uint32_t size = d < 0 ? 0u - (uint32_t)d : (uint32_t)d;
-        most = size > most ? size : most;
-    }
-    return most;
+static inline int32_t NAME(span_left)(const row_spans *s, int32_t k) {
+    const int32_t x = s->left + k * s->left_step;
+    return x > s->low ? x : s->low;
 }
 
-ATTRIBUTES static uint64_t NAME(row_64)(const int32_t *z, int32_t n, int64_t base, int m, int64_t start,
-                                        int64_t slope) {
+static inline int32_t NAME(span_right)(const row_spans *s, int32_t k) {
+    const int32_t x = s->right + k * s->right_step;
+    return x < s->high ? x : s->high;
+}
+
+static uint32_t NAME(rows_32)(const int32_t *z, size_t stride, const row_spans *spans, int m, uint32_t start,
+                              uint32_t gx, uint32_t gy) {
+    static const int32_t count[LANES] = {0, 1, 2, 3, 4, 5, 6, 7};
+    lanes_i index;
+    memcpy(&index, count, sizeof index);
+    const lanes_u ramp = (lanes_u)index * gx;
+    const uint32_t step = LANES * gx;
+    lanes_u most = {0}, also = {0};
+    for (int32_t k = 0; k < spans->rows; k++, z += stride) {
+        int32_t x = NAME(span_left)(spans, k);
+        const int32_t end = NAME(span_right)(spans, k) + 1;
+        if (x >= end) continue;
+        lanes_u plane = ramp + (start + (uint32_t)k * gy + (uint32_t)x * gx);
+        for (; x + 2 * LANES <= end; x += 2 * LANES) {
+            lanes_u one, two;
+            memcpy(&one, z + x, sizeof one);
+            memcpy(&two, z + x + LANES, sizeof two);
+            const lanes_u next = plane + step;
+            one = LANES_ABS((lanes_i)((one << m) - plane));
+            two = LANES_ABS((lanes_i)((two << m) - next));
+            most = LANES_MAX(most, one);
+            also = LANES_MAX(also, two);
+            plane = next + step;
+        }
+        if (x + LANES <= end) {
+            lanes_u one;
+            memcpy(&one, z + x, sizeof one);
+            most = LANES_MAX(most, LANES_ABS((lanes_i)((one << m) - plane)));
+            plane += step;
+            x += LANES;
+        }
+        if (x < end) {
+            const lanes_i wanted = index < end - x;
+            lanes_u one = {0};
+#ifdef LANES_AVX2
+            one = (lanes_u)_mm256_maskload_epi32(z + x, (__m256i)wanted);
+#else
+            for (int i = 0; i < end - x; i++) one[i] = (uint32_t)z[x + i];
+#endif
+            also = LANES_MAX(also, LANES_ABS((lanes_i)((one << m) - plane)) & (lanes_u)wanted);
+        }
+    }
+    most = LANES_MAX(most, also);
+    uint32_t out = 0;
+    for (int i = 0; i < LANES; i++) out = most[i] > out ? most[i] : out;
+    return out;
+}
+
+static uint64_t NAME(rows_64)(const int32_t *z, size_t stride, const row_spans *spans, int m, int64_t start,
+                              int64_t gx, int64_t gy) {
     int64_t most = 0;
-    for (int32_t i = 0; i < n; i++) {
-        const int64_t d = (z[i] - base) * ((int64_t)1 << m) - start - i * slope;
-        const int64_t size = d < 0 ? -d : d;
-        most = size > most ? size : most;
+    for (int32_t k = 0; k < spans->rows; k++, z += stride) {
+        const int32_t end = NAME(span_right)(spans, k);
+        for (int32_t x = NAME(span_left)(spans, k); x <= end; x++) {
+            const int64_t d = z[x] * ((int64_t)1 << m) - (start + k * gy) - x * gx;
+            const int64_t size = d < 0 ? -d : d;
+            most = size > most ? size : most;
+        }
     }
     return (uint64_t)most;
 }
 
-ATTRIBUTES static double NAME(row_double)(const int32_t *z, int32_t n, int32_t base, double area, double start,
-                                          double slope) {
-    /* Four sums side by side: a maximum of doubles is not reordered by the compiler. */
+static double NAME(row_double)(const int32_t *z, int32_t n, int32_t base, double area, double start, double slope) {
+    /* Four maxima side by side: those of doubles are not reordered by the compiler. */
     double most[4] = {0, 0, 0, 0};
     int32_t i = 0;
     for (; i + 4 <= n; i += 4)

@@ -51,6 +51,10 @@ void tile_free(error_tile *tile, const rqt_allocator *allocator) {
     memset(tile, 0, sizeof *tile);
 }
 
+static int32_t smaller(int32_t a, int32_t b) {
+    return a < b ? a : b;
+}
+
 static void raise_error(error_tile *tile, rqt_vertex v, rqt_code code, bool mixed) {
     const size_t at = (size_t)(v.y - tile->y) * tile->stride + (size_t)(v.x - tile->x);
     if (code > tile->code[at]) tile->code[at] = code;
@@ -100,17 +104,49 @@ static void measure_cell(error_tile *tile, int32_t x, int32_t y, int n) {
     }
 }
 
-/* All triangles of a cell of side 2^n with n > 0. */
-static void measure_cells(error_tile *tile, int32_t x, int32_t y, int n) {
+/* The cells of sides up to 2^levels that are inside the raster and without voids. */
+static void measure_small_cells(error_tile *tile, int levels) {
+    const deviation_field *s = tile->field;
+    const int32_t side = 1 << tile->b, rows = 1 << levels;
+    for (int32_t y = 0; y < side && tile->y + y < s->height - 1; y += rows)
+        for (int32_t x = 0; x < side && tile->x + x < s->width - 1; x += STRIP_COLUMNS) {
+            const sample_window window = {tile->x + x, tile->y + y,
+                                          smaller(tile->x + smaller(x + STRIP_COLUMNS, side), s->width - 1),
+                                          smaller(tile->y + y + rows, s->height - 1)};
+            const int state = window_state(s, &window);
+            if (state == HAS_VOID) continue;
+            const size_t at = sample_index(s, window.x0, window.y0);
+            const cell_strip strip = {.z = s->q + at,
+                                      .valid = state == HAS_VALID ? NULL : s->valid + at,
+                                      .stride = (size_t)s->width,
+                                      .columns = window.x1 - window.x0 + 1,
+                                      .rows = window.y1 - window.y0 + 1,
+                                      .x = window.x0,
+                                      .y = window.y0,
+                                      .levels = levels,
+                                      .code = tile->code + (size_t)y * tile->stride + (size_t)x,
+                                      .code_stride = tile->stride};
+            s->kernels->cells(&strip, &s->scale);
+        }
+}
+
+/* All triangles of a cell of side 2^n with n > 0, but for the cells that are done: small, inside and without voids.
+ * pure: this one is inside and without voids. */
+static void measure_cells(error_tile *tile, int32_t x, int32_t y, int n, int levels, bool pure) {
     const deviation_field *s = tile->field;
     const int32_t side = 1 << n, half = side / 2;
     if (x >= s->width - 1 || y >= s->height - 1) return; /* no area */
-    const sample_window window = window_of(s, x, y, n);
-    const int state = window_state(s, &window);
-    if (state == HAS_VOID) return;
+    if (!pure) {
+        const sample_window window = window_of(s, x, y, n);
+        const int state = window_state(s, &window);
+        if (state == HAS_VOID) return;
+        pure = state == HAS_VALID && x + side < s->width && y + side < s->height;
+    }
+    if (pure && n <= levels) return;
     measure_cell(tile, x, y, n);
     if (n == 1) return;
-    for (int i = 0; i < 4; i++) measure_cells(tile, x + (i & 1 ? half : 0), y + (i & 2 ? half : 0), n - 1);
+    for (int i = 0; i < 4; i++)
+        measure_cells(tile, x + (i & 1 ? half : 0), y + (i & 2 ? half : 0), n - 1, levels, pure);
 }
 
 /* ------------------------------------------------------------------------------------- upper triangles */
@@ -157,6 +193,9 @@ void tile_measure(error_tile *tile, int32_t i, int32_t j) {
     tile->any_outline = false;
     memset(tile->code, 0, n * sizeof *tile->code);
     if (tile->outline) memset(tile->outline, 0, n);
-    if (tile->b > 0) measure_cells(tile, tile->x, tile->y, tile->b);
+    /* Small cells in 32 bits, where that is enough. */
+    const int levels = tile->field->relief < CELL_RELIEF ? smaller(tile->b, CELL_LEVELS) : 0;
+    if (levels > 0) measure_small_cells(tile, levels);
+    if (tile->b > 0) measure_cells(tile, tile->x, tile->y, tile->b, levels, false);
     measure_upper(tile);
 }
