@@ -402,6 +402,15 @@ static void copy_flags(const rqt_block *b, uint8_t *flags) {
     flags[last * n + last] &= RQT_VALID;
 }
 
+/* Has a vertex other than a corner the outline bit? */
+static bool has_outline(const rqt_block *b) {
+    const size_t n = (size_t)side_of(b->k), count = n * n, corners[4] = {0, n - 1, count - n, count - 1};
+    size_t bits = 0;
+    for (size_t i = 0; i < count; i++) bits += (b->flags[i] & RQT_OUTLINE) != 0;
+    for (int c = 0; c < 4; c++) bits -= (b->flags[corners[c]] & RQT_OUTLINE) != 0;
+    return bits > 0;
+}
+
 /* The payload of a block that keeps all vertices; ends of its pieces but the last. False: it cannot be stored. */
 static bool put_whole(rqt_codec *codec, const rqt_block *block, rqt_block_header *h, uint8_t **p,
                       size_t ends[PIECES]) {
@@ -421,20 +430,17 @@ static bool put_whole(rqt_codec *codec, const rqt_block *block, rqt_block_header
     ends[0] = (size_t)(*p - codec->payload);
 
     repeat_heights(codec->q, n, width, height);
-    copy_flags(block, codec->flags);
     uint8_t *const outline = codec->bits;
-    h->has_outline = predict_outline(&codec->marks, block->k, width, height, codec->flags, outline);
-    const rqt_block flagged = {.k = block->k, .error = block->error, .flags = codec->flags};
-    h->ground = h->has_outline ? ground_of(&flagged) : 0;
-    const error_field field = {block->k,
-                               width,
-                               height,
-                               codec->q,
-                               h->has_voids || h->all_void || h->has_outline ? codec->flags : NULL,
-                               h->ground,
-                               h->quantum,
-                               false,
-                               false};
+    h->has_outline = has_outline(block);
+    const bool flagged = h->has_voids || h->all_void || h->has_outline;
+    if (flagged) copy_flags(block, codec->flags);
+    if (h->has_outline) {
+        predict_outline(&codec->marks, block->k, width, height, codec->flags, outline);
+        const rqt_block known = {.k = block->k, .error = block->error, .flags = codec->flags};
+        h->ground = ground_of(&known);
+    }
+    const error_field field = {block->k,  width,      height, codec->q, flagged ? codec->flags : NULL,
+                               h->ground, h->quantum, false,  false};
     predict_errors(&codec->errors, &field, block->error);
     h->finest_planes = put_planes16(p, codec->errors.residual, finest);
     h->error_planes = put_planes16(p, codec->errors.residual + finest, count - KEPT_CORNERS - finest);

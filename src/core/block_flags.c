@@ -107,21 +107,15 @@ static void take_bits(bit_grid *grid, int32_t n, const uint8_t *flags, int flag)
             grid->row[y][x / 64] |= (uint64_t)((flags[y * n + x] & flag) != 0) << x % 64;
 }
 
-bool predict_outline(flag_scratch *s, int k, int32_t width, int32_t height, const uint8_t *flags, uint8_t *bits) {
-    const int32_t n = (1 << k) + 1, last = n - 1;
+void predict_outline(flag_scratch *s, int k, int32_t width, int32_t height, const uint8_t *flags, uint8_t *bits) {
+    const int32_t n = (1 << k) + 1;
     take_bits(&s->valid, n, flags, RQT_VALID);
     take_bits(&s->outline, n, flags, RQT_OUTLINE);
-    for (int c = 0; c < 4; c++) drop_bit(s->outline.row[c & 2 ? last : 0], c & 1 ? last : 0);
-    uint64_t any = 0;
-    for (int32_t y = 0; y < n; y++)
-        for (int w = 0; w < ROW_WORDS; w++) any |= s->outline.row[y][w];
-    if (!any) return false;
     memset(&s->residual, 0, (size_t)n * sizeof s->residual.row[0]);
     code_outline(false, s, k, width, height);
     memset(bits, 0, (size_t)(n * n + 7) / 8);
     for (int32_t i = 0; i < n * n; i++)
         bits[i / 8] = (uint8_t)(bits[i / 8] | bit_at(&s->residual, i % n, i / n) << i % 8);
-    return true;
 }
 
 /* ------------------------------------------------------------------------------------------ restoring */
