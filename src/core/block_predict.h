@@ -128,8 +128,8 @@ typedef struct flag_scratch {
     bit_grid valid, outline, residual;
 } flag_scratch;
 
-/* Outline bits of flags -> n*n residual bits, row by row; the corners do not count. False: there are none. */
-bool predict_outline(flag_scratch *scratch, int k, int32_t width, int32_t height, const uint8_t *flags,
+/* Outline bits of flags, in which the corners have none, -> n*n residual bits, row by row. */
+void predict_outline(flag_scratch *scratch, int k, int32_t width, int32_t height, const uint8_t *flags,
                      uint8_t *bits);
 
 typedef struct flag_source {

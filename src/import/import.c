@@ -66,7 +66,7 @@ const char *import_gdal_version(void) {
 void import_options_init(import_options *options) {
     long cores = sysconf(_SC_NPROCESSORS_ONLN), pages = sysconf(_SC_PHYS_PAGES), page = sysconf(_SC_PAGE_SIZE);
     int64_t half = pages > 0 && page > 0 ? (int64_t)pages * page / 2 : INT64_MAX;
-    *options = (import_options){.k = 6,
+    *options = (import_options){.k = 7,
                                 .void_tol = 1,
                                 .jobs = cores < 1    ? 1
                                         : cores > 64 ? 64
