@@ -580,8 +580,8 @@ static const char *get_sparse(rqt_codec *codec, const rqt_block_header *h, rqt_b
         size_t valid = 0, outlines = 0;
         for (size_t i = 0; i < kept; i++) {
             const size_t j = i - KEPT_CORNERS;
-            const unsigned v = h->has_voids ? validity[i / 8] >> i % 8 & 1u : !h->all_void;
-            const unsigned o = h->has_outline && i >= KEPT_CORNERS ? outline[j / 8] >> j % 8 & 1u : 0;
+            const unsigned v = h->has_voids ? (unsigned)validity[i / 8] >> i % 8 & 1 : !h->all_void;
+            const unsigned o = h->has_outline && i >= KEPT_CORNERS ? (unsigned)outline[j / 8] >> j % 8 & 1 : 0;
             valid += v;
             outlines += o;
             block->flags[list->vertex[i].at] = (uint8_t)(v * RQT_VALID | o * RQT_OUTLINE);
