@@ -233,6 +233,27 @@ static void plain_and_fast_kernels_give_equal_bytes(void **state) {
         }
 }
 
+/* Small and large differences take different ways to their deviations, and deviations of more than 24 bits another
+ * one to their codes. */
+static void errors_of_every_relief_equal_the_oracles(void **state) {
+    (void)state;
+    random_begin("relief");
+    for (int bits = 1; bits <= 30; bits++)
+        for (int n = 0; n < 4; n++) {
+            raster r = raster_make(SURFACE_CONSTANT, random_between(17, 40), random_between(17, 40), -1);
+            for (int i = 0; i < r.width * r.height; i++) {
+                r.q[i] = random_between(-(1 << (bits - 1)) + 1, (1 << (bits - 1)) - 1);
+                if (n == 3) { /* a few spikes, just above errors that are codes themselves */
+                    bool spike = bits > 8 && random_between(0, 19) == 0;
+                    r.q[i] = spike ? (random_between(128, 255) << (bits - 8)) + 1 : 0;
+                }
+            }
+            if (n == 1) raster_add_lake(&r);
+            if (n != 2) r.unit = UNIT_METRE;
+            check_errors_equal_oracle(r);
+        }
+}
+
 static void bad_plans_are_refused(void **state) {
     (void)state;
     random_begin("plans");
@@ -266,11 +287,9 @@ static void bad_plans_are_refused(void **state) {
 int main(void) {
     random_announce();
     const struct CMUnitTest tests[] = {
-        TEST(sweeps_equal_the_whole_for_every_small_extent),
-        TEST(sweeps_equal_the_oracle),
-        TEST(sweeps_of_larger_rasters_equal_the_whole),
-        TEST(plain_and_fast_kernels_give_equal_bytes),
-        TEST(bad_plans_are_refused),
+        TEST(sweeps_equal_the_whole_for_every_small_extent), TEST(sweeps_equal_the_oracle),
+        TEST(sweeps_of_larger_rasters_equal_the_whole),      TEST(plain_and_fast_kernels_give_equal_bytes),
+        TEST(errors_of_every_relief_equal_the_oracles),      TEST(bad_plans_are_refused),
     };
     return cmocka_run_group_tests_name("sweep", tests, NULL, NULL);
 }
