@@ -181,6 +181,17 @@ MUTANTS = [
     ("import: decimals tried from zero only", "src/import/quantise.c", "if (z0 == t->steps.z0) return true;",
      "if (z0 == t->steps.z0 || z0 > 0) return true;",
      "test_import_stream", "every_way_gives_the_same_tables_of_decimals"),
+    # blocks out of bands
+    ("build: a parent does not hear of its children's own", "src/core/build.c",
+     "most = error[u] > most ? error[u] : most;", "(void)error;",
+     "test_core_build", "blocks_of_bands_are_those_of_the_pyramid"),
+    ("build: the far vertex on the wrong side", "src/core/build.c", "{2 * ax - cx, cy}", "{2 * ax - cx, ay}",
+     "test_core_build", "blocks_of_bands_are_those_of_the_pyramid"),
+    ("build: kept rows end with the band", "src/core/build.c", "(first + per_band + 1 == w->rows ? 1 : 0)", "0",
+     "test_core_build", "blocks_of_bands_are_those_of_the_pyramid"),
+    ("past: vertices without area are taken at their word", "src/core/internal.h",
+     "return v.x - q < lattice->width - 1 && v.y - q < lattice->height - 1;", "return true;",
+     "test_core_build", "blocks_of_bands_are_those_of_the_pyramid"),
     # the wire format
     ("wire: a guess stays where a height was sent", "src/core/wire_steps.h",
      "        settle(w, m, false);\n        return true;", "        return true;",
