@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""rqt_mesh(..., 'rqt') and rqt_delta, read by a decoder written from src/core/FORMAT.md alone: the vertices of rqt_range and the triangles
-of rqt_triangles come back, each in its order; increments, applied step by step, end in the mesh as asked for at once."""
+"""rqt_mesh(..., 'rqt') and rqt_delta, read by a decoder written from src/core/FORMAT.md alone: the vertices of rqt_range come back, in the
+order in which triangles name them, and the triangles of rqt_triangles in theirs; increments, applied step by step, end in the mesh as asked for at once."""
 import ctypes
 import ctypes.util
 import os
@@ -266,8 +266,13 @@ def indexed(blob):
 
 
 def compare(title, wire, db, region, eps):
-    equal(title + ": vertices in the order of rqt_range", wire.vertices,
-          rows(db, "SELECT col, row, q, level FROM rqt_range(?, ?)", region, eps))
+    equal(title + ": the vertices of rqt_range", sorted(wire.vertices),
+          sorted(rows(db, "SELECT col, row, q, level FROM rqt_range(?, ?)", region, eps)))
+    apex_first = {}
+    for t in wire.triangles:
+        for corner in sorted(t):
+            apex_first.setdefault(corner, len(apex_first))
+    check(title + ": each vertex where a triangle first names it", all(i == n for i, n in apex_first.items()) and len(apex_first) == len(wire.vertices))
     equal(title + ": triangles in the order of the walk", wire.positions(), indexed(one(db, "SELECT rqt_mesh(?, ?, 'indexed')", region, eps)))
     equal(title + ": its eps", wire.eps, float(eps))
 

@@ -634,8 +634,9 @@ rqt_status rqt_mesh_decode(const uint8_t *bytes, size_t size, rqt_mesh_header *h
 
 /* ---------------------------------------------------------------------------------------------- wire --
  * A patch in about a byte a vertex, to send and to keep: topology as decisions of the walk, heights as residuals
- * (FORMAT.md, "Wire"). What is decoded is the patch of the query: the same vertices and triangles in the same
- * order; only the errors of vertices are not sent and read 0. Mesh to memory in ten lines:
+ * (FORMAT.md, "Wire"). What is decoded is the patch of the query with leaves (wants_leaves: without, the same
+ * vertices may be numbered otherwise): the same vertices and triangles in the same order; only the errors of
+ * vertices are not sent and read 0. Mesh to memory in ten lines:
  *
  *   rqt_wire_header header;
  *   rqt_patch patch;
