@@ -68,6 +68,11 @@ static uint64_t known_among(wire_walk *w, const wire_line *d, uint64_t candidate
         const wire_entry *before = w->prior.size ? wire_table_find(&w->prior, wire_at(w, p)) : NULL;
         if (!e && !(before && before->index == WIRE_CHOSEN)) continue;
         known |= UINT64_C(1) << i;
+        if (e) {
+            w->q[p] = e->q;
+            w->memo[p] = e->index;
+            continue;
+        }
         take_height(w, p, mean_of(w->q + p, d->from), WIRE_EDGES, d->looks_up);
     }
     return known;
@@ -141,16 +146,16 @@ static inline uint64_t spread(uint64_t v) {
 }
 
 /* A row of the grid at half the step: what was in it, and what is between. */
-static void interleave(const wire_row *even, const wire_row *odd, wire_row *out) {
-    for (int j = 0; j < WIRE_WORDS; j++) {
+static inline void interleave(const wire_row *even, const wire_row *odd, wire_row *out, int words) {
+    for (int j = 0; j < words; j++) {
         const int shift = 32 * (j & 1);
         out->word[j] = spread(even->word[j / 2] >> shift) | spread(odd->word[j / 2] >> shift) << 1;
     }
 }
 
 /* Both ends of each interval of a row. */
-static inline uint64_t pairs(const wire_row *row, int j) {
-    return row->word[j] & (row->word[j] >> 1 | (j + 1 < WIRE_WORDS ? row->word[j + 1] << 63 : 0));
+static inline uint64_t pairs(const wire_row *row, int j, int words) {
+    return row->word[j] & (row->word[j] >> 1 | (j + 1 < words ? row->word[j + 1] << 63 : 0));
 }
 
 /* The row of sides that run across, between squares r - 1 and r. */
@@ -165,7 +170,7 @@ static uint64_t take_across(wire_walk *w, wire_line line, uint32_t m, uint32_t s
         line.from[2] = line.from[0], line.from[3] = line.from[1];
     }
     for (int j = 0; j < words; j++) {
-        uint64_t candidates = pairs(&w->grid[r], j);
+        uint64_t candidates = pairs(&w->grid[r], j, words);
         if (r > 0) candidates &= w->centres[r - 1].word[j];
         if (r < m) candidates &= w->centres[r].word[j];
         const uint64_t taken = (is_side ? take_side : take_word)(w, &line, (uint32_t)j, candidates);
@@ -181,6 +186,12 @@ static uint64_t take_down(wire_walk *w, wire_line line, uint32_t m, uint32_t s, 
     wire_row *const down = &w->down[r];
     const int words = (int)m / 64 + 1;
     uint64_t any = 0;
+    uint64_t some = 0;
+    for (int j = 0; j < words; j++) {
+        some |= centre->word[j];
+        down->word[j] = 0;
+    }
+    if (!some) return 0;
     line.place = (2 * r + 1) * s * (uint32_t)w->n;
     wire_line side = line;
     side.from[0] = line.from[2], side.from[1] = line.from[3];
@@ -216,7 +227,7 @@ static bool take_scale(wire_walk *w, uint32_t m, uint32_t s) {
     w->listed = 0;
     for (uint32_t r = 0; r < m; r++, line.place += 2 * s * (uint32_t)w->n)
         for (int j = 0; j < words; j++) {
-            const uint64_t candidates = pairs(&w->grid[r], j) & pairs(&w->grid[r + 1], j);
+            const uint64_t candidates = pairs(&w->grid[r], j, words) & pairs(&w->grid[r + 1], j, words);
             w->centres[r].word[j] = take_word(w, &line, (uint32_t)j, candidates);
             any |= w->centres[r].word[j];
         }
@@ -240,18 +251,14 @@ static void take_vertices(wire_walk *w) {
         take_height(w, corner[i], w->last_q, WIRE_LOOSE, true);
         w->last_q = w->q[corner[i]];
     }
-    memset(w->grid, 0, 2 * sizeof *w->grid);
-    w->grid[0].word[0] = w->grid[1].word[0] = 3;
+    w->grid[0] = w->grid[1] = (wire_row){{3}};
     for (uint32_t m = 1, s = last / 2; s > 0; m *= 2, s /= 2) {
-        const size_t bytes = (m + 1) * sizeof(wire_row);
-        memset(w->centres, 0, bytes);
-        memset(w->across, 0, bytes);
-        memset(w->down, 0, bytes);
         if (!take_scale(w, m, s) || s == 1) break;
+        const int words = (int)(2 * m) / 64 + 1;
         for (uint32_t r = m + 1; r-- > 0;) { /* in place, from the end */
             const wire_row row = w->grid[r];
-            if (r < m) interleave(&w->down[r], &w->centres[r], &w->grid[2 * r + 1]);
-            interleave(&row, &w->across[r], &w->grid[2 * r]);
+            if (r < m) interleave(&w->down[r], &w->centres[r], &w->grid[2 * r + 1], words);
+            interleave(&row, &w->across[r], &w->grid[2 * r], words);
         }
     }
 }

@@ -81,15 +81,17 @@ rqt_status wire_walk_create(wire_walk *w, const rqt_lattice *lattice, int k, con
     w->kind = memory_take(allocator, places);
     w->column = memory_take(allocator, places * sizeof *w->column);
     w->row = memory_take(allocator, places * sizeof *w->row);
-    w->scale = memory_take(allocator, places);
+    w->where = memory_take(allocator, places * sizeof *w->where);
     if (!w->memo || !w->q || !w->order || !w->list || !w->slot || !w->grid || !w->centres || !w->across ||
-        !w->down || !w->kind || !w->column || !w->row || !w->scale)
+        !w->down || !w->kind || !w->column || !w->row || !w->where)
         return RQT_NO_MEMORY;
     memset(w->q, 0, places * sizeof *w->q);
     for (size_t p = 0; p < places; p++) {
         w->column[p] = (uint16_t)(p % (size_t)w->n);
         w->row[p] = (uint16_t)(p / (size_t)w->n);
-        w->scale[p] = (uint8_t)__builtin_ctz((unsigned)(w->column[p] | w->row[p]) | 1U << k);
+        const uint32_t last = 1U << k, u = w->column[p], v = w->row[p];
+        const bool is_side = u == 0 || v == 0 || u == last || v == last;
+        w->where[p] = u | v << 9 | (uint32_t)__builtin_ctz(u | v | last) << 18 | (uint32_t)is_side << 22;
     }
     return RQT_OK;
 }
@@ -108,7 +110,7 @@ void wire_walk_free(wire_walk *w) {
     memory_drop(a, w->kind);
     memory_drop(a, w->column);
     memory_drop(a, w->row);
-    memory_drop(a, w->scale);
+    memory_drop(a, w->where);
     memory_drop(a, w->table.entry);
     memory_drop(a, w->prior.entry);
     memory_drop(a, w->vertices);
@@ -200,10 +202,9 @@ void wire_leaf(wire_walk *w, uint32_t a, uint32_t l, uint32_t r, uint32_t clockw
     out[1 + clockwise] = index_of(w, r);
 }
 
-/* A second child that waits for its turn; its left end is where the first one is left. */
-typedef struct later {
-    uint32_t m, a, r, splits;
-} later;
+/* A second child that waits for its turn, in one number: places are below 2^17. Its left end is where the first one
+ * is left. */
+enum { PLACE_BITS = 17, PLACE_MASK = (1 << PLACE_BITS) - 1 };
 
 /* New vertices are a matter of chance: no branch. What is written for an old one is overwritten by the next. */
 static inline uint32_t give_index(uint32_t *restrict memo, uint32_t *restrict order, uint32_t *next, uint32_t first,
@@ -218,7 +219,7 @@ static inline uint32_t give_index(uint32_t *restrict memo, uint32_t *restrict or
 }
 
 void wire_list(wire_walk *w, uint32_t a, uint32_t l, uint32_t r, int depth, uint32_t clockwise) {
-    later stack[2 * RQT_MAX_BLOCK_K + 1], *top = stack;
+    uint64_t stack[2 * RQT_MAX_BLOCK_K + 1], *top = stack;
     uint32_t *restrict const memo = w->memo, *restrict const order = w->order;
     uint32_t *restrict out = w->triangles + 3 * w->triangle_count;
     uint32_t next = (uint32_t)w->vertex_count, splits = (uint32_t)depth, il = WIRE_NONE;
@@ -228,7 +229,8 @@ void wire_list(wire_walk *w, uint32_t a, uint32_t l, uint32_t r, int depth, uint
             const uint32_t m = (l + r) / 2;
             if (splits == 0 || memo[m] == WIRE_NONE) break;
             splits--;
-            *top++ = (later){m, a, r, splits};
+            *top++ =
+                m | (uint64_t)a << PLACE_BITS | (uint64_t)r << 2 * PLACE_BITS | (uint64_t)splits << 3 * PLACE_BITS;
             r = a;
             a = m;
         }
@@ -242,11 +244,11 @@ void wire_list(wire_walk *w, uint32_t a, uint32_t l, uint32_t r, int depth, uint
         out += 3;
         if (top == stack) break;
         il = ir; /* a leaf is entered where the one before is left */
-        top--;
-        l = top->a;
-        a = top->m;
-        r = top->r;
-        splits = top->splits;
+        const uint64_t later = *--top;
+        a = later & PLACE_MASK;
+        l = later >> PLACE_BITS & PLACE_MASK;
+        r = later >> 2 * PLACE_BITS & PLACE_MASK;
+        splits = (uint32_t)(later >> 3 * PLACE_BITS);
     }
     w->vertex_count = next;
     w->triangle_count = (size_t)(out - w->triangles) / 3;
@@ -260,11 +262,12 @@ void wire_block_end(wire_walk *w) {
     for (size_t i = 0; i < count; i++, out++) {
         const uint32_t p = w->order[i];
         if (p == WIRE_NONE) continue;
-        *out = (rqt_patch_vertex){.col = w->place.x + (w->column[p] << w->shift),
-                                  .row = w->place.y + (w->row[p] << w->shift),
+        const uint32_t where = w->where[p];
+        *out = (rqt_patch_vertex){.col = w->place.x + (int32_t)((where & 0x1FF) << w->shift),
+                                  .row = w->place.y + (int32_t)((where >> 9 & 0x1FF) << w->shift),
                                   .q = w->q[p],
-                                  .level = (uint8_t)(finest - w->scale[p])};
-        if (!w->kind[p]) continue;
+                                  .level = (uint8_t)(finest - (where >> 18 & 15))};
+        if (!(where >> 22)) continue;
         const rqt_vertex at = {out->col, out->row};
         out->level = (uint8_t)rqt_vertex_level(&w->lattice, at); /* its step may be larger than the block's */
         wire_table_insert(&w->table, at, out->q, (uint32_t)(w->first + i));

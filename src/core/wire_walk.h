@@ -113,8 +113,8 @@ typedef struct wire_walk {
     wire_row *grid, *centres, *across, *down; /* which vertices there are: squares' corners, centres, sides */
     uint8_t *kind;                            /* by place */
     uint16_t *column, *row;                   /* by place, in strides */
-    uint8_t *scale;                           /* by place: log2 of its step in strides */
-    bool kind_is_plain;                       /* kind is as in a block that is not clamped */
+    uint32_t *where;    /* by place: column, row << 9, log2 of its step in strides << 18, on a side? << 22 */
+    bool kind_is_plain; /* kind is as in a block that is not clamped */
     /* coding only */
     const rqt_triangle *wanted; /* leaves to code */
     size_t wanted_count, next;
