@@ -149,7 +149,7 @@ MUTANTS = [
      "test_import", "heights_far_from_zero_lose_nothing"),
     # the wire format
     ("wire: a sample keeps the level it was met with first", "src/core/wire_walk.c",
-     "if (level < v->level) v->level = level;", "",
+     "if (level < v->level) v->level = level;", "if (level > v->level) v->level = level;",
      "test_wire", "the_patch_of_the_query_comes_back_in_its_order"),
     ("wire: an increment of any mesh is taken", "src/core/wire_decode.c",
      "if (rqt_wire_digest(patch) != from)", "if (from == 0)",
