@@ -148,8 +148,8 @@ MUTANTS = [
     ("import: heights far from zero", "src/import/quantise.c", "(int64_t)middle", "(int64_t)0",
      "test_import", "heights_far_from_zero_lose_nothing"),
     # the wire format
-    ("wire: a sample keeps the level it was met with first", "src/core/wire_walk.c",
-     "if (level < v->level) v->level = level;", "if (level > v->level) v->level = level;",
+    ("wire: a leaf begins at the apex of the one before", "src/core/wire_walk.c",
+     "il = ir;", "il = ia;",
      "test_wire", "the_patch_of_the_query_comes_back_in_its_order"),
     ("wire: an increment of any mesh is taken", "src/core/wire_decode.c",
      "if (rqt_wire_digest(patch) != from)", "if (from == 0)",
