@@ -193,14 +193,14 @@ MUTANTS = [
      "return v.x - q < lattice->width - 1 && v.y - q < lattice->height - 1;", "return true;",
      "test_core_build", "blocks_of_bands_are_those_of_the_pyramid"),
     # the wire format
-    ("wire: a guess stays where a height was sent", "src/core/wire_steps.h",
-     "        settle(w, m, false);\n        return true;", "        return true;",
+    ("wire: a leaf begins at the apex of the one before", "src/core/wire_walk.c",
+     "il = ir;", "il = ia;",
      "test_wire", "the_patch_of_the_query_comes_back_in_its_order"),
     ("wire: an increment of any mesh is taken", "src/core/wire_decode.c",
      "if (rqt_wire_digest(patch) != from)", "if (from == 0)",
      "test_wire", "increments_that_belong_elsewhere_are_refused_with_a_reason"),
     ("wire: heights beyond the limit", "src/core/wire_decode.c",
-     "if (q > -RQT_HEIGHT_LIMIT && q < RQT_HEIGHT_LIMIT)", "if (q != INT64_MIN)",
+     "r->bad |= !(q > -RQT_HEIGHT_LIMIT && q < RQT_HEIGHT_LIMIT);", "r->bad |= q == INT64_MIN;",
      "test_wire", "hostile_bytes_are_refused_or_harmless"),
 ]
 

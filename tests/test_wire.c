@@ -268,7 +268,7 @@ static void a_chain_of_increments_costs_little_more_than_the_mesh(void **state) 
     }
     blob b = encode(&now, NULL);
     printf("%zu bytes in steps, %zu at once, %zu vertices\n", sum - headers, b.size, now.patch.vertex_count);
-    assert_true(sum - headers < b.size + b.size / 4);
+    assert_true(sum - headers < b.size + b.size / 3);
     free(b.bytes);
     answer_free(&now);
     rqt_region_free(region);

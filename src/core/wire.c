@@ -125,7 +125,7 @@ rqt_status rqt_wire_info(const uint8_t *bytes, size_t size, rqt_wire_header *hea
     if (room < 4 || get32(frame) != ZSTD_MAGICNUMBER || ZSTD_findFrameCompressedSize(frame, room) != room ||
         ZSTD_getFrameContentSize(frame, room) != payload || payload / ZSTD_BLOCK > room / LEAST_ZSTD_BLOCK)
         return corrupt(message, "the mesh's compressed bytes are cut off, or not what follows its header");
-    if (h.vertex_count >= WIRE_CLOCKWISE || h.triangle_count >= WIRE_CLOCKWISE)
+    if (h.vertex_count >= WIRE_MOST || h.triangle_count >= WIRE_MOST)
         return corrupt(message, "the mesh has more vertices or triangles than indices reach");
     *header = h;
     sentence_begin(message, "");
@@ -133,11 +133,15 @@ rqt_status rqt_wire_info(const uint8_t *bytes, size_t size, rqt_wire_header *hea
 }
 
 size_t rqt_wire_bound(size_t vertex_count, size_t triangle_count, size_t block_count) {
-    /* A height: token and 29 bits. A triangle: on the way down to it at most one symbol a level of its block, a
-     * byte or a bit. A block: on the way down four symbols a level, if no other shares them. */
-    const size_t payload = WIRE_DIRECTORY + WIRE_STREAMS + 5 * vertex_count +
-                           triangle_count * (2 * RQT_MAX_BLOCK_K + 1) * 9 / 8 + block_count * (4 * RQT_MAX_K + 1) +
-                           1;
+    /* A height: token and 29 bits. A triangle: on the way down to it at most one symbol a level of its block. What
+     * its vertices depend on outside the patch: four vertices a level, a byte and six bits each, but no more than
+     * the block has places. A block: its corners and far vertices, and on the way down four symbols a level, if no
+     * other shares them. */
+    const size_t side = (1 << RQT_MAX_BLOCK_K) + 1, levels = 2 * RQT_MAX_BLOCK_K + 1;
+    const size_t by_triangle = 4 * levels * triangle_count, by_block = side * side * block_count;
+    const size_t payload = WIRE_DIRECTORY + WIRE_STREAMS + 5 * vertex_count + triangle_count * levels +
+                           2 * (by_triangle < by_block ? by_triangle : by_block) +
+                           block_count * (4 * RQT_MAX_K + 1 + 6 * 5) + 1;
     return RQT_WIRE_HEADER_BYTES + ZSTD_COMPRESSBOUND(payload) + 4 * WIRE_STREAMS;
 }
 

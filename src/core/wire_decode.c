@@ -18,42 +18,94 @@ typedef struct decoder {
     uint8_t bits[256];
 } decoder;
 
-static inline bool step_split(wire_walk *w, int stream, uint32_t a, uint32_t l, uint32_t r) {
+/* Bits of a word go where the mask has ones, in order. */
+static uint64_t deposit(uint64_t bits, uint64_t mask, int *count) {
+    uint64_t out = 0;
+    *count = 0;
+    for (; mask; mask &= mask - 1, bits >>= 1, ++*count) out |= mask & (0 - mask) & (0 - (bits & 1));
+    return out;
+}
+
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(RQT_SCALAR)
+__attribute__((target("bmi2,popcnt"))) static uint64_t deposit_bmi2(uint64_t bits, uint64_t mask, int *count) {
+    *count = __builtin_popcountll(mask);
+    return __builtin_ia32_pdep_di(bits, mask);
+}
+#define HAS_BMI2 (__builtin_cpu_supports("bmi2") && __builtin_cpu_supports("popcnt"))
+#else
+#define deposit_bmi2 deposit
+#define HAS_BMI2 false
+#endif
+
+static inline uint64_t step_splits(wire_walk *w, int stream, uint64_t candidates, uint32_t first, uint32_t gap) {
+    (void)first, (void)gap;
     wire_stream *s = &w->stream[stream];
-    const size_t at = s->at++;
-    (void)a, (void)l, (void)r;
-    return s->p[at >> 3] >> (at & 7) & 1;
+    const uint8_t *p = s->p + (s->at >> 3);
+    const int shift = (int)(s->at & 7);
+    const uint64_t bits = get64(p) >> shift | (uint64_t)p[8] << 1 << (63 - shift);
+    int count;
+    const uint64_t chosen =
+        w->has_bmi2 ? deposit_bmi2(bits, candidates, &count) : deposit(bits, candidates, &count);
+    s->at += (size_t)count;
+    return chosen;
 }
 
-static inline bool step_expects(const wire_walk *w, uint32_t a, uint32_t l, uint32_t r, bool split) {
-    (void)w, (void)a, (void)l, (void)r, (void)split;
-    return true;
-}
+typedef struct reader {
+    const decoder *d;
+    const uint8_t *token, *raw;
+    size_t at; /* bits of raw */
+    bool bad;
+} reader;
 
-static inline int32_t step_height(wire_walk *w, int stream, uint32_t p, int32_t guess) {
-    const decoder *d = (const decoder *)(const void *)w; /* the walk is its first member */
-    wire_stream *s = &w->stream[stream], *raw = &w->stream[WIRE_RAW];
-    const uint8_t token = s->p[s->at++];
-    uint32_t v = d->base[token];
-    (void)p;
+static inline int32_t read_height(reader *r, int32_t guess) {
+    const uint8_t token = *r->token++;
     /* For most tokens no bits: but a branch costs more than reading them. */
-    const int bits = d->bits[token];
-    v += (uint32_t)(get64(raw->p + (raw->at >> 3)) >> (raw->at & 7)) & ((1U << bits) - 1);
-    raw->at += (size_t)bits;
-    const int32_t residual = (int32_t)(v >> 1 ^ (0 - (v & 1)));
-    const int64_t q = (int64_t)guess + residual;
-    if (q > -RQT_HEIGHT_LIMIT && q < RQT_HEIGHT_LIMIT) return (int32_t)q;
-    w->bad = true;
-    return 0;
+    const int bits = r->d->bits[token];
+    const uint32_t v =
+        r->d->base[token] + ((uint32_t)(get64(r->raw + (r->at >> 3)) >> (r->at & 7)) & ((1U << bits) - 1));
+    r->at += (size_t)bits;
+    const int64_t q = (int64_t)guess + (int32_t)(v >> 1 ^ (0 - (v & 1)));
+    r->bad |= !(q > -RQT_HEIGHT_LIMIT && q < RQT_HEIGHT_LIMIT);
+    return (int32_t)q;
+}
+
+static inline reader open_reader(const wire_walk *w, int stream) {
+    const wire_stream *s = &w->stream[stream], *raw = &w->stream[WIRE_RAW];
+    return (reader){(const decoder *)(const void *)w, s->p + s->at, raw->p, raw->at, false}; /* its first member */
+}
+
+static inline void close_reader(wire_walk *w, int stream, const reader *r) {
+    w->stream[stream].at = (size_t)(r->token - w->stream[stream].p);
+    w->stream[WIRE_RAW].at = r->at;
+    w->bad |= r->bad;
+}
+
+static int32_t step_height(wire_walk *w, int stream, uint32_t p, int32_t guess) {
+    reader r = open_reader(w, stream);
+    const int32_t q = read_height(&r, guess);
+    (void)p;
+    close_reader(w, stream, &r);
+    return q;
+}
+
+static void step_heights(wire_walk *w, int stream, const int from[4]) {
+    reader r = open_reader(w, stream);
+    uint32_t *restrict const memo = w->memo;
+    const uint32_t *restrict const list = w->list;
+    int32_t *const q = w->q;
+    const int a = from[0], b = from[1], c = from[2], d = from[3];
+    for (size_t i = 0; i < w->listed; i++) {
+        const uint32_t p = list[i];
+        const int32_t *const at = q + p;
+        q[p] = read_height(&r, (int32_t)(((int64_t)at[a] + at[b] + at[c] + at[d]) >> 2));
+        memo[p] = WIRE_CHOSEN;
+    }
+    close_reader(w, stream, &r);
 }
 
 static int step_some(wire_walk *w) {
     wire_stream *s = &w->stream[WIRE_PART];
     return s->at < s->end ? s->p[s->at++] : -1;
-}
-
-static inline void step_leaf(wire_walk *w, uint32_t a, uint32_t l, uint32_t r) {
-    (void)w, (void)a, (void)l, (void)r;
 }
 
 #include "wire_steps.h"
@@ -195,9 +247,10 @@ static rqt_status run(decoder *d, const rqt_wire_header *h, const uint8_t *bytes
     if (status == RQT_OK) {
         for (uint32_t t = 0; t < 256; t++) {
             /* What is no token is a residual that no height can have. */
-            d->base[t] = t < WIRE_TOKENS ? wire_token_base(t) : UINT32_MAX - 1;
-            d->bits[t] = t < WIRE_TOKENS ? (uint8_t)wire_token_bits(t) : 0;
+            d->base[t] = t < WIRE_TOKEN_COUNT ? wire_token_base(t) : UINT32_MAX - 1;
+            d->bits[t] = t < WIRE_TOKEN_COUNT ? (uint8_t)wire_token_bits(t) : 0;
         }
+        w->has_bmi2 = HAS_BMI2;
         walk_cell(w, 0, 0, 0);
         if (w->failed)
             status = RQT_NO_MEMORY;

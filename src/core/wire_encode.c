@@ -16,7 +16,11 @@ enum {
     WORTH_A_TABLE = 256 /* bytes of a stream, below which it shares a zstd block with its neighbours */
 };
 
+enum { WIRE_WANTED = 1, WIRE_USED = 2 }; /* a vertex; a corner of a leaf, or its sample is */
+
 /* ------------------------------------------------------------------------------------------ primitives */
+
+static inline uint32_t canonical(const wire_walk *w, uint32_t p);
 
 static bool grow(wire_walk *w, wire_stream *s, size_t need) {
     size_t capacity = s->end;
@@ -55,28 +59,42 @@ static bool is_wanted_leaf(const wire_walk *w, uint32_t a, uint32_t l, uint32_t 
     return is_at(t->apex, wire_at(w, a)) && is_at(t->left, wire_at(w, l)) && is_at(t->right, wire_at(w, r));
 }
 
-static bool step_split(wire_walk *w, int stream, uint32_t a, uint32_t l, uint32_t r) {
-    const bool split = !is_wanted_leaf(w, a, l, r);
-    put_bits(w, stream, split, 1);
-    return split;
+static uint64_t step_splits(wire_walk *w, int stream, uint64_t candidates, uint32_t first, uint32_t gap) {
+    uint64_t chosen = 0;
+    for (; candidates; candidates &= candidates - 1) {
+        const int i = __builtin_ctzll(candidates);
+        const bool wanted = w->want[first + (uint32_t)i * gap] & WIRE_WANTED;
+        put_bits(w, stream, wanted, 1);
+        chosen |= (uint64_t)wanted << i;
+    }
+    return chosen;
 }
 
-static bool step_expects(wire_walk *w, uint32_t a, uint32_t l, uint32_t r, bool split) {
-    if (split == is_wanted_leaf(w, a, l, r)) w->bad = true;
-    return !w->bad;
-}
-
+/* A vertex that no leaf of the block has is there because others depend on it: it costs least as it is guessed. */
 static int32_t step_height(wire_walk *w, int stream, uint32_t p, int32_t guess) {
-    const wire_entry *e = wire_table_find(w->heights, rqt_vertex_clamp(&w->lattice, wire_at(w, p)));
-    if (!e) {
-        w->bad = true;
-        return 0;
+    int32_t q = guess;
+    if (p >= (uint32_t)(w->n * w->n) || (w->want[canonical(w, p)] & WIRE_USED)) {
+        const wire_entry *e = wire_table_find(w->heights, rqt_vertex_clamp(&w->lattice, wire_at(w, p)));
+        if (e)
+            q = e->q;
+        else
+            w->bad = true;
     }
     int bits;
-    const uint32_t v = wire_zigzag((int32_t)((uint32_t)e->q - (uint32_t)guess));
+    const uint32_t v = wire_zigzag((int32_t)((uint32_t)q - (uint32_t)guess));
     put_byte(w, stream, wire_token_of(v, &bits));
     put_bits(w, WIRE_RAW, v, bits);
-    return e->q;
+    return q;
+}
+
+static void step_heights(wire_walk *w, int stream, const int from[4]) {
+    for (size_t i = 0; i < w->listed; i++) {
+        const uint32_t p = w->list[i];
+        const int32_t *q = w->q + p;
+        const int64_t four = (int64_t)q[from[0]] + q[from[1]] + q[from[2]] + q[from[3]];
+        w->q[p] = step_height(w, stream, p, (int32_t)(four >> 2));
+        w->memo[p] = WIRE_CHOSEN;
+    }
 }
 
 static int step_some(wire_walk *w) {
@@ -84,13 +102,6 @@ static int step_some(wire_walk *w) {
     const int amounts = w->some[w->some_next++];
     put_byte(w, WIRE_PART, (uint32_t)amounts);
     return amounts;
-}
-
-static void step_leaf(wire_walk *w, uint32_t a, uint32_t l, uint32_t r) {
-    if (is_wanted_leaf(w, a, l, r))
-        w->next++;
-    else
-        w->bad = true;
 }
 
 #include "wire_steps.h"
@@ -118,6 +129,9 @@ static int survey(wire_walk *w, uint32_t a, uint32_t l, uint32_t r, int splits) 
     if (!next_is_within(w, a, l, r)) return WIRE_EMPTY;
     if (is_wanted_leaf(w, a, l, r)) {
         w->next++;
+        w->want[canonical(w, a)] |= WIRE_USED;
+        w->want[canonical(w, l)] |= WIRE_USED;
+        w->want[canonical(w, r)] |= WIRE_USED;
         return WIRE_FULL;
     }
     if (splits == 0) { /* a leaf finer than the block */
@@ -133,6 +147,7 @@ static int survey(wire_walk *w, uint32_t a, uint32_t l, uint32_t r, int splits) 
     w->some = some;
     w->some_count++;
     const uint32_t m = (l + r) / 2;
+    w->want[m] |= WIRE_WANTED;
     const int first = w->bad ? WIRE_EMPTY : survey(w, m, l, a, splits - 1);
     const int second = w->bad ? WIRE_EMPTY : survey(w, m, a, r, splits - 1);
     const bool first_is_whole = first == WIRE_FULL || (w->clamped && is_flat(w, m, l, a));
@@ -145,13 +160,40 @@ static int survey(wire_walk *w, uint32_t a, uint32_t l, uint32_t r, int splits) 
     return WIRE_SOME;
 }
 
-/* Both halves of the block at hand; next stays. */
+/* Whatever a vertex depends on is one too. */
+static void close_wanted(wire_walk *w) {
+    const size_t n = (size_t)w->n, last = n - 1;
+    uint8_t *const want = w->want;
+    for (size_t s = 1; s < last; s *= 2) {
+        for (size_t v = 0; v < n; v += s)
+            for (size_t u = v & s ? 0 : s; u < n; u += 2 * s) { /* sides */
+                const size_t p = v * n + u;
+                if (!(want[p] & WIRE_WANTED)) continue;
+                if (u > 0) want[p - s] |= WIRE_WANTED;
+                if (u < last) want[p + s] |= WIRE_WANTED;
+                if (v > 0) want[p - s * n] |= WIRE_WANTED;
+                if (v < last) want[p + s * n] |= WIRE_WANTED;
+            }
+        for (size_t v = s; v < n; v += 2 * s)
+            for (size_t u = s; u < n; u += 2 * s) {
+                const size_t p = v * n + u;
+                if (want[p] & WIRE_WANTED) {
+                    want[p - s * n - s] |= WIRE_WANTED;
+                    want[p - s * n + s] |= WIRE_WANTED;
+                    want[p + s * n - s] |= WIRE_WANTED;
+                    want[p + s * n + s] |= WIRE_WANTED;
+                }
+            }
+    }
+}
+
+/* Both halves of the block at hand; goes past their leaves. */
 static void survey_block(wire_walk *w, int amount[2]) {
     const rqt_block_place *p = &w->place;
     const uint32_t n = (uint32_t)w->n, last = n - 1, corner[4] = {0, last, last * n, last * n + last};
     const int c = (p->i & 1) | (p->j & 1) << 1, center = 3 - c;
-    const size_t begin = w->next;
     w->some_count = w->some_next = 0;
+    memset(w->want, 0, (size_t)n * n);
     for (int h = 0; h < 2 && !w->bad; h++) {
         int apex = c ^ (h + 1), from = h == 0 ? center : c, to = h == 0 ? c : center;
         if (p->level == 0) apex = h + 1, from = h == 0 ? 0 : 3, to = 3 - from;
@@ -162,10 +204,12 @@ static void survey_block(wire_walk *w, int amount[2]) {
         const rqt_triangle *t = &w->wanted[w->next];
         if (is_at(t->apex, wire_at(w, corner[center])) && is_at(t->left, near) && is_at(t->right, far)) {
             amount[h] = WIRE_QUARTER;
+            w->want[canonical(w, corner[center])] |= WIRE_USED;
+            w->want[canonical(w, corner[c])] |= WIRE_USED;
             w->next++;
         }
     }
-    w->next = begin;
+    close_wanted(w);
 }
 
 /* ---------------------------------------------------------------------------------------------- blocks */
@@ -305,7 +349,7 @@ static rqt_status run(wire_walk *w, const rqt_wire_header *header, blocks *b, co
     if (!wire_table_reserve(&w->allocator, &heights, patch->vertex_count)) return RQT_NO_MEMORY;
     for (size_t i = 0; i < patch->vertex_count; i++) {
         const rqt_vertex at = {patch->vertices[i].col, patch->vertices[i].row};
-        if (!wire_table_find(&heights, at)) wire_table_insert(&heights, at, patch->vertices[i].q);
+        if (!wire_table_find(&heights, at)) wire_table_insert(&heights, at, patch->vertices[i].q, WIRE_NONE);
     }
     w->heights = &heights;
     w->wanted = patch->leaves;
@@ -343,18 +387,21 @@ rqt_status rqt_wire_encode(const rqt_wire_header *header, const rqt_block_number
                            uint8_t *bytes, size_t *size) {
     *size = 0;
     if (header->k < 0 || header->k > header->lattice.K || header->k > RQT_MAX_BLOCK_K ||
-        patch->vertex_count >= WIRE_CLOCKWISE || patch->triangle_count >= WIRE_CLOCKWISE ||
+        patch->vertex_count >= WIRE_MOST || patch->triangle_count >= WIRE_MOST ||
         (patch->triangle_count > 0 && !patch->leaves) || (state && state->triangle_count > 0 && !state->leaves))
         return RQT_INVALID;
     wire_walk *w = memory_take(allocator, sizeof *w);
     if (!w) return RQT_NO_MEMORY;
     blocks b = {numbers, block_count, 0};
     rqt_status status = wire_walk_create(w, &header->lattice, header->k, allocator);
+    w->want = memory_take(allocator, (size_t)w->n * (size_t)w->n);
+    if (!w->want) status = RQT_NO_MEMORY;
     if (status == RQT_OK)
         status = run(w, header, &b, patch, state, bytes,
                      rqt_wire_bound(patch->vertex_count, patch->triangle_count, block_count), size);
     for (int i = 0; i < WIRE_STREAMS; i++) memory_drop(allocator, w->stream[i].p);
     memory_drop(allocator, w->some);
+    memory_drop(allocator, w->want);
     wire_walk_free(w);
     memory_drop(allocator, w);
     return status;

@@ -14,30 +14,31 @@
 #include "internal.h"
 
 #define WIRE_NONE UINT32_MAX
-#define WIRE_CLOCKWISE (UINT32_C(1) << 31) /* on the apex of a leaf that waits for its indices */
+#define WIRE_CHOSEN (UINT32_MAX - 1)  /* a vertex that has no index as yet */
+#define WIRE_MOST (UINT32_C(1) << 31) /* counts are less */
 
 enum {
     WIRE_CLASSES = 2 * RQT_MAX_K, /* 2 * log2 of the step of a vertex, + 1 for centres */
+    WIRE_WORDS = 3,               /* of a row of at most 129 bits */
 
     /* Streams. Of bits: those named so; of bytes: the others. */
     WIRE_SHAPE = 0,      /* which blocks there are, and of their halves how much */
     WIRE_PART = 1,       /* of triangles that are in the patch in part: which children */
-    WIRE_LOOSE = 2,      /* heights of vertices that no hypotenuse predicts */
-    WIRE_BITS_KNOWN = 3, /* is it split? of hypotenuses on the block's north or west side */
-    WIRE_BITS_SIDE = 4,  /* of those on its other sides or past the last sample */
-    WIRE_BY_CLASS = 5,   /* four for each class: */
-    WIRE_TOKEN_LONE = 0, /*   heights, from the two ends */
-    WIRE_TOKEN_PAIR = 1, /*   heights, from the four corners of the diamond */
-    WIRE_BITS_LONE = 2,  /*   is it split? the apex across is not decided yet */
-    WIRE_BITS_PAIR = 3,  /*   the apex across is a vertex */
-    WIRE_PER_CLASS = 4,
+    WIRE_LOOSE = 2,      /* heights of corners and far vertices */
+    WIRE_BITS_KNOWN = 3, /* is it a vertex? of places on the block's north or west side */
+    WIRE_BITS_SIDE = 4,  /* of those on its other sides */
+    WIRE_EDGES = 5,      /* heights of vertices on the block's sides and past the last sample */
+    WIRE_BY_CLASS = 6,   /* two for each class: */
+    WIRE_TOKENS = 0,     /*   heights */
+    WIRE_BITS = 1,       /*   is it a vertex? */
+    WIRE_PER_CLASS = 2,
     WIRE_RAW = WIRE_BY_CLASS + WIRE_PER_CLASS * WIRE_CLASSES, /* bits that follow tokens */
     WIRE_STREAMS = WIRE_RAW + 1
 };
 
 static inline bool wire_is_bits(int stream) {
     if (stream == WIRE_BITS_KNOWN || stream == WIRE_BITS_SIDE || stream == WIRE_RAW) return true;
-    return stream >= WIRE_BY_CLASS && (stream - WIRE_BY_CLASS) % WIRE_PER_CLASS >= WIRE_BITS_LONE;
+    return stream >= WIRE_BY_CLASS && (stream - WIRE_BY_CLASS) % WIRE_PER_CLASS == WIRE_BITS;
 }
 
 typedef struct wire_stream {
@@ -46,14 +47,17 @@ typedef struct wire_stream {
     size_t end; /* decoding: bytes there are; coding: bytes there is room for */
 } wire_stream;
 
-/* What is known of a place of the block at hand; the order matters. */
-enum {
-    WIRE_UNKNOWN = 0,
-    WIRE_FORCED = 1, /* a vertex, because one that depends on it is; its height is still to come */
-    WIRE_NOT = 2,    /* not a vertex */
-    WIRE_VERTEX = 3, /* a vertex with its height */
-    WIRE_GUESS = 4   /* a vertex whose height is a guess as yet */
-};
+/* A row of a bitmap of the block. */
+typedef struct wire_row {
+    uint64_t word[WIRE_WORDS];
+} wire_row;
+
+/* A sample in the last column or row, which several places of a block may be. */
+typedef struct wire_slot {
+    int32_t q;
+    uint32_t index; /* in the patch, or WIRE_CHOSEN */
+    bool has;       /* a height */
+} wire_slot;
 
 /* What is special about a place; 0 for most. */
 enum {
@@ -90,30 +94,35 @@ typedef struct wire_walk {
     uint32_t *triangles;
     rqt_triangle *leaves; /* NULL: not wanted */
     size_t vertex_count, vertex_room, triangle_count, triangle_room;
-    size_t settled; /* triangles before this one have indices, the others places */
     wire_table table;
     wire_table prior; /* vertices known beforehand, by lattice vertex; size 0: none */
     int32_t last_q;   /* the last height without a prediction */
     /* the block at hand */
     rqt_block_place place;
-    int streams;            /* number of its first stream for a triangle that can be split 0 times */
-    int shift;              /* log2 of its stride */
-    int32_t u_rim, v_rim;   /* first column and row of its grid at or past the last sample */
-    bool clamped;           /* some of them are past it */
-    rqt_vertex far[2];      /* of the places n*n and n*n + 1 */
-    uint32_t *memo;         /* by place: index in the patch, or WIRE_NONE */
-    int32_t *q;             /* by place */
-    uint16_t *state;        /* by place; not bytes, which a compiler thinks may be anything */
-    uint8_t *kind;          /* by place */
-    uint16_t *column, *row; /* by place, in strides */
-    uint8_t *scale;         /* by place: log2 of its step in strides */
-    bool kind_is_plain;     /* kind is as in a block that is not clamped */
+    int shift;            /* log2 of its stride */
+    int32_t u_rim, v_rim; /* first column and row of its grid at or past the last sample */
+    bool clamped;         /* some of them are past it */
+    rqt_vertex far[2];    /* of the places n*n and n*n + 1 */
+    uint32_t *memo;       /* by place: index in the patch, WIRE_CHOSEN, or WIRE_NONE: not a vertex */
+    uint32_t *order;      /* places of the vertices that this block adds, from `first` on; WIRE_NONE: written */
+    size_t first;
+    int32_t *q;     /* by place */
+    uint32_t *list; /* places that wait for their heights */
+    size_t listed;
+    wire_slot *slot; /* of samples in the last column, by row, and in the last row, by n + column */
+    wire_row *grid, *centres, *across, *down; /* which vertices there are: squares' corners, centres, sides */
+    uint8_t *kind;                            /* by place */
+    uint16_t *column, *row;                   /* by place, in strides */
+    uint32_t *where;    /* by place: column, row << 9, log2 of its step in strides << 18, on a side? << 22 */
+    bool kind_is_plain; /* kind is as in a block that is not clamped */
     /* coding only */
     const rqt_triangle *wanted; /* leaves to code */
     size_t wanted_count, next;
     const wire_table *heights; /* of the patch to code, by sample */
+    uint8_t *want;             /* by place: is it a vertex? */
     uint8_t *some;             /* of the triangles that are in the patch in part, in walk order: their children */
     size_t some_count, some_room, some_next;
+    bool has_bmi2; /* decoding: the processor's */
 } wire_walk;
 
 static inline uint64_t wire_key(rqt_vertex v) {
@@ -141,11 +150,12 @@ static inline rqt_vertex wire_sample(const wire_walk *w, rqt_vertex v) {
 rqt_status wire_walk_create(wire_walk *w, const rqt_lattice *lattice, int k, const rqt_allocator *allocator);
 void wire_walk_free(wire_walk *w);
 bool wire_block_begin(wire_walk *w, const rqt_block_place *place); /* false: no memory */
-/* Give indices to the leaves that wait for them, in a block or half that is not clamped. */
-void wire_settle_plain(wire_walk *w);
-void wire_vertex_append(wire_walk *w, uint32_t place);
+void wire_block_end(wire_walk *w);
+/* A triangle that is in the patch as a whole, in front of the last column and row: all of its leaves. */
+void wire_list(wire_walk *w, uint32_t a, uint32_t l, uint32_t r, int splits, uint32_t clockwise);
+void wire_leaf(wire_walk *w, uint32_t a, uint32_t l, uint32_t r, uint32_t clockwise);
 bool wire_table_reserve(const rqt_allocator *allocator, wire_table *table, size_t more);
-void wire_table_insert(wire_table *table, rqt_vertex v, int32_t q);
+void wire_table_insert(wire_table *table, rqt_vertex v, int32_t q, uint32_t index);
 bool wire_prior_create(const rqt_allocator *allocator, const rqt_lattice *lattice, const rqt_patch *state,
                        wire_table *prior);
 
@@ -164,7 +174,7 @@ static inline uint32_t wire_token_of(uint32_t v, int *bits) {
     *bits = e - 2;
     return 64 + (uint32_t)(e - 6) * 4 + ((v >> (e - 2)) & 3);
 }
-enum { WIRE_TOKENS = 64 + 26 * 4 };
+enum { WIRE_TOKEN_COUNT = 64 + 26 * 4 };
 static inline int wire_token_bits(uint32_t token) {
     return token < 64 ? 0 : (int)(token - 64) / 4 + 4;
 }
