@@ -9,7 +9,7 @@
 /* A function compiled a second time for machines with AVX2: the same bytes, for it has the same operations (and
  * none fused). All that it calls must be compiled into it. (Sanitizers cannot follow the choice at load time.) */
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
-    !defined(RQT_SCALAR)
+    !defined(__SANITIZE_THREAD__) && !defined(RQT_SCALAR)
 #define VECTOR_CLONES __attribute__((target_clones("avx2", "default")))
 #else
 #define VECTOR_CLONES

@@ -28,7 +28,7 @@ typedef struct half {
 
 /* One binary for every machine: the wider instructions where the processor has them, the same bytes everywhere. */
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
-    !defined(RQT_SCALAR)
+    !defined(__SANITIZE_THREAD__) && !defined(RQT_SCALAR)
 #define VECTOR_CLONES __attribute__((target_clones("avx2", "default")))
 #else
 #define VECTOR_CLONES
