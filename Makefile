@@ -157,11 +157,15 @@ check-docs: ## fail when ext/SQL.md or the README's session are not what the pro
 	@BUILD=$(BUILD) ./tests/check_readme.sh
 
 # ---------------------------------------------------------------------------------------------------- benches
-.PHONY: bench bench-table1 chart peers
+.PHONY: bench bench-data bench-table1 chart peers
 bench: ## speed and size beside GDAL's, medians of five and more
 	@./src/install-packages.sh build test
 	@$(MAKE) --no-print-directory -j2 products
 	@BUILD=$(BUILD) ./tests/bench/bench.sh
+bench-data: ## real DEMs of DATA=dir: database beside COG, bits of every part, the wire format
+	@./src/install-packages.sh build test
+	@$(MAKE) --no-print-directory -j2 products
+	@BUILD=$(BUILD) ./tests/bench/bench_data.sh $(DATA)
 bench-table1: ## share of vertices over eps beside the paper's table 1
 	@./src/install-packages.sh build test
 	@$(MAKE) --no-print-directory -j2 products

@@ -613,6 +613,18 @@ static void a_payload_that_lies_is_found_out_under_a_good_checksum(void **state)
         assert_int_equal(rqt_block_decode(codec, b.data, b.size, &scratch), sparse[i].status);
         free(b.data);
     }
+    /* Of a larger block: bits for the centre alone, in one byte and in one too many. */
+    rqt_block larger = new_block(2);
+    const uint8_t bits_of_none[2] = {0, 0};
+    header[AT_K] = 2;
+    put32(header + AT_KEPT, 4);
+    for (size_t n = 0; n <= 2; n++) {
+        b = forge(header, bits_of_none, n);
+        assert_int_equal(rqt_block_decode(codec, b.data, b.size, &larger), n == 1 ? RQT_OK : RQT_CORRUPT);
+        free(b.data);
+    }
+    header[AT_K] = 1;
+    rqt_block_free(&larger, &allocator);
     static const struct {
         size_t at;
         uint8_t value;

@@ -5,6 +5,9 @@
  * rqt_errors_saturate give it - and the oracle's. The plain kernels and the fast ones give equal bytes. */
 #include "test_core_support.h"
 
+#include <pthread.h>
+#include <stdatomic.h>
+
 #include "error_tile.h"
 
 /* ------------------------------------------------------------------------------------------- one sweep -- */
@@ -201,6 +204,58 @@ static void sweeps_of_larger_rasters_equal_the_whole(void **state) {
     check_sweeps(raster_make(SURFACE_EXTREMES, 300, 280, -1), 5, false);
 }
 
+/* Tiles of a band on threads, which take the next one when they are through with theirs. */
+typedef struct crew {
+    rqt_sweep *sweep;
+    atomic_int *next;
+    int worker;
+} crew;
+
+static void *measure_some(void *argument) {
+    const crew *c = argument;
+    for (int tile; (tile = atomic_fetch_add(c->next, 1)) < rqt_sweep_tiles(c->sweep);)
+        rqt_sweep_tile(c->sweep, c->worker, tile);
+    return NULL;
+}
+
+static void tiles_of_a_band_may_be_measured_at_once(void **state) {
+    (void)state;
+    random_begin("threads");
+    enum { THREADS = 3 };
+    raster r = raster_make(SURFACE_HILLS, 1100, 200, -1);
+    raster_add_lake(&r);
+    whole w;
+    whole_create(&w, &r, NULL);
+    const rqt_sweep_plan plan = plan_of(&r, 4, THREADS);
+    rqt_sweep *sweep;
+    assert_int_equal(rqt_sweep_create(&plan, &test_allocator, &sweep), RQT_OK);
+    for (int y = 0; y < r.height; y++)
+        if (rqt_sweep_wants(sweep, y)) rqt_sweep_first(sweep, y, r.q + y * r.width, r.valid + y * r.width);
+    for (int32_t band = 0; band < rqt_sweep_bands(sweep); band++) {
+        int32_t first, count, *q;
+        uint8_t *valid;
+        rqt_sweep_begin(sweep, band, &first, &count, &q, &valid);
+        memcpy(q, r.q + first * r.width, (size_t)(count * r.width) * sizeof *q);
+        memcpy(valid, r.valid + first * r.width, (size_t)(count * r.width));
+        atomic_int next = 0;
+        pthread_t thread[THREADS];
+        crew member[THREADS];
+        for (int i = 0; i < THREADS; i++) {
+            member[i] = (crew){sweep, &next, i};
+            assert_int_equal(pthread_create(&thread[i], NULL, measure_some, &member[i]), 0);
+        }
+        for (int i = 0; i < THREADS; i++) assert_int_equal(pthread_join(thread[i], NULL), 0);
+        rqt_sweep_end(sweep);
+        if (band > 0) check_band(&w, sweep, &plan, band - 1);
+    }
+    check_band(&w, sweep, &plan, rqt_sweep_bands(sweep) - 1);
+    rqt_sweep_finish(sweep);
+    check_coarse(&w, sweep, &plan);
+    rqt_sweep_free(sweep);
+    rqt_errors_free(&w.errors, &test_allocator);
+    raster_free(&r);
+}
+
 static void check_plain_equals_best(raster r) {
     const rqt_grid grid = {plan_of(&r, 0, 1).lattice, r.q, r.valid};
     const int K = grid.lattice.K;
@@ -230,6 +285,27 @@ static void plain_and_fast_kernels_give_equal_bytes(void **state) {
                                    n == 0 ? 257 : random_between(2, 150), -1);
             if (n == 3) raster_add_lake(&r);
             check_plain_equals_best(r);
+        }
+}
+
+/* Small and large differences take different ways to their deviations, and deviations of more than 24 bits another
+ * one to their codes. */
+static void errors_of_every_relief_equal_the_oracles(void **state) {
+    (void)state;
+    random_begin("relief");
+    for (int bits = 1; bits <= 30; bits++)
+        for (int n = 0; n < 4; n++) {
+            raster r = raster_make(SURFACE_CONSTANT, random_between(17, 40), random_between(17, 40), -1);
+            for (int i = 0; i < r.width * r.height; i++) {
+                r.q[i] = random_between(-(1 << (bits - 1)) + 1, (1 << (bits - 1)) - 1);
+                if (n == 3) { /* a few spikes, just above errors that are codes themselves */
+                    bool spike = bits > 8 && random_between(0, 19) == 0;
+                    r.q[i] = spike ? (random_between(128, 255) << (bits - 8)) + 1 : 0;
+                }
+            }
+            if (n == 1) raster_add_lake(&r);
+            if (n != 2) r.unit = UNIT_METRE;
+            check_errors_equal_oracle(r);
         }
 }
 
@@ -270,6 +346,8 @@ int main(void) {
         TEST(sweeps_equal_the_oracle),
         TEST(sweeps_of_larger_rasters_equal_the_whole),
         TEST(plain_and_fast_kernels_give_equal_bytes),
+        TEST(tiles_of_a_band_may_be_measured_at_once),
+        TEST(errors_of_every_relief_equal_the_oracles),
         TEST(bad_plans_are_refused),
     };
     return cmocka_run_group_tests_name("sweep", tests, NULL, NULL);

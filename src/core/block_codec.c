@@ -270,16 +270,6 @@ static size_t put_bits(uint8_t *bits, size_t at, const uint8_t *flags, int32_t n
     return set;
 }
 
-static size_t get_bits(const uint8_t *bits, size_t at, uint8_t *flags, int32_t n, int flag) {
-    size_t set = 0;
-    for (int32_t x = 0; x < n; x++, at++) {
-        const int bit = bits[at / 8] >> at % 8 & 1;
-        flags[x] = (uint8_t)(bit * flag);
-        set += (size_t)bit;
-    }
-    return set;
-}
-
 static bool padding_is_zero(const uint8_t *bits, size_t count) {
     return count % 8 == 0 || bits[count / 8] >> count % 8 == 0;
 }
@@ -402,6 +392,15 @@ static void copy_flags(const rqt_block *b, uint8_t *flags) {
     flags[last * n + last] &= RQT_VALID;
 }
 
+/* Has a vertex other than a corner the outline bit? */
+static bool has_outline(const rqt_block *b) {
+    const size_t n = (size_t)side_of(b->k), count = n * n, corners[4] = {0, n - 1, count - n, count - 1};
+    size_t bits = 0;
+    for (size_t i = 0; i < count; i++) bits += (b->flags[i] & RQT_OUTLINE) != 0;
+    for (int c = 0; c < 4; c++) bits -= (b->flags[corners[c]] & RQT_OUTLINE) != 0;
+    return bits > 0;
+}
+
 /* The payload of a block that keeps all vertices; ends of its pieces but the last. False: it cannot be stored. */
 static bool put_whole(rqt_codec *codec, const rqt_block *block, rqt_block_header *h, uint8_t **p,
                       size_t ends[PIECES]) {
@@ -421,20 +420,17 @@ static bool put_whole(rqt_codec *codec, const rqt_block *block, rqt_block_header
     ends[0] = (size_t)(*p - codec->payload);
 
     repeat_heights(codec->q, n, width, height);
-    copy_flags(block, codec->flags);
     uint8_t *const outline = codec->bits;
-    h->has_outline = predict_outline(&codec->marks, block->k, width, height, codec->flags, outline);
-    const rqt_block flagged = {.k = block->k, .error = block->error, .flags = codec->flags};
-    h->ground = h->has_outline ? ground_of(&flagged) : 0;
-    const error_field field = {block->k,
-                               width,
-                               height,
-                               codec->q,
-                               h->has_voids || h->all_void || h->has_outline ? codec->flags : NULL,
-                               h->ground,
-                               h->quantum,
-                               false,
-                               false};
+    h->has_outline = has_outline(block);
+    const bool flagged = h->has_voids || h->all_void || h->has_outline;
+    if (flagged) copy_flags(block, codec->flags);
+    if (h->has_outline) {
+        predict_outline(&codec->marks, block->k, width, height, codec->flags, outline);
+        const rqt_block known = {.k = block->k, .error = block->error, .flags = codec->flags};
+        h->ground = ground_of(&known);
+    }
+    const error_field field = {block->k,  width,      height, codec->q, flagged ? codec->flags : NULL,
+                               h->ground, h->quantum, false,  false};
     predict_errors(&codec->errors, &field, block->error);
     h->finest_planes = put_planes16(p, codec->errors.residual, finest);
     h->error_planes = put_planes16(p, codec->errors.residual + finest, count - KEPT_CORNERS - finest);
@@ -567,7 +563,6 @@ static const char *get_whole(rqt_codec *codec, const rqt_block_header *h, rqt_bl
 
 static const char *get_sparse(rqt_codec *codec, const rqt_block_header *h, rqt_block *block) {
     kept_list *list = &codec->list;
-    uint8_t *flags = list->kept; /* codec->flags may be the block's */
     const size_t kept = h->kept, count = kept - KEPT_CORNERS, vertices = count_of(h->k);
     const uint8_t *errors = codec->payload + kept * (size_t)h->height_planes;
     const uint8_t *validity = errors + count * (size_t)h->error_planes;
@@ -580,22 +575,24 @@ static const char *get_sparse(rqt_codec *codec, const rqt_block_header *h, rqt_b
     memset(block->flags, RQT_VALID, vertices);
     get_planes(codec->payload, kept, h->height_planes, (int32_t)kept, codec->residual);
     if (restore_kept_heights(list, h->k, codec->residual, block->q) >> 31) return "heights that are out of range";
-    if (h->has_voids || h->all_void) {
-        if (h->has_voids) {
-            const size_t valid = get_bits(validity, 0, flags, (int32_t)kept, RQT_VALID);
-            if (valid == 0 || valid == kept || !padding_is_zero(validity, kept))
-                return "validity bits that are not what its flags promise";
+    const bool flagged = h->has_voids || h->all_void || h->has_outline;
+    if (flagged) {
+        size_t valid = 0, outlines = 0;
+        for (size_t i = 0; i < kept; i++) {
+            const size_t j = i - KEPT_CORNERS;
+            const unsigned v = h->has_voids ? (unsigned)validity[i / 8] >> i % 8 & 1 : !h->all_void;
+            const unsigned o = h->has_outline && i >= KEPT_CORNERS ? (unsigned)outline[j / 8] >> j % 8 & 1 : 0;
+            valid += v;
+            outlines += o;
+            block->flags[list->vertex[i].at] = (uint8_t)(v * RQT_VALID | o * RQT_OUTLINE);
         }
-        for (size_t i = 0; i < kept; i++) block->flags[list->vertex[i].at] = h->has_voids ? flags[i] : 0;
-    }
-    if (h->has_outline) {
-        if (get_bits(outline, 0, flags, (int32_t)count, RQT_OUTLINE) == 0 || !padding_is_zero(outline, count))
+        if (h->has_voids && (valid == 0 || valid == kept || !padding_is_zero(validity, kept)))
+            return "validity bits that are not what its flags promise";
+        if (h->has_outline && (outlines == 0 || !padding_is_zero(outline, count)))
             return "outline bits that are not what its flags promise";
-        for (size_t i = 0; i < count; i++) block->flags[list->vertex[i + KEPT_CORNERS].at] |= flags[i];
     }
     get_planes16(errors, count, h->error_planes, codec->errors.residual);
-    if (!restore_kept_errors(list, block, h->has_voids || h->all_void || h->has_outline, h->quantum, h->ground,
-                             codec->errors.residual))
+    if (!restore_kept_errors(list, block, flagged, h->quantum, h->ground, codec->errors.residual))
         return "a vertex that is kept although its error is not above the floor";
     return NULL;
 }

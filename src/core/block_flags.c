@@ -107,36 +107,35 @@ static void take_bits(bit_grid *grid, int32_t n, const uint8_t *flags, int flag)
             grid->row[y][x / 64] |= (uint64_t)((flags[y * n + x] & flag) != 0) << x % 64;
 }
 
-bool predict_outline(flag_scratch *s, int k, int32_t width, int32_t height, const uint8_t *flags, uint8_t *bits) {
-    const int32_t n = (1 << k) + 1, last = n - 1;
+void predict_outline(flag_scratch *s, int k, int32_t width, int32_t height, const uint8_t *flags, uint8_t *bits) {
+    const int32_t n = (1 << k) + 1;
     take_bits(&s->valid, n, flags, RQT_VALID);
     take_bits(&s->outline, n, flags, RQT_OUTLINE);
-    for (int c = 0; c < 4; c++) drop_bit(s->outline.row[c & 2 ? last : 0], c & 1 ? last : 0);
-    uint64_t any = 0;
-    for (int32_t y = 0; y < n; y++)
-        for (int w = 0; w < ROW_WORDS; w++) any |= s->outline.row[y][w];
-    if (!any) return false;
     memset(&s->residual, 0, (size_t)n * sizeof s->residual.row[0]);
     code_outline(false, s, k, width, height);
     memset(bits, 0, (size_t)(n * n + 7) / 8);
     for (int32_t i = 0; i < n * n; i++)
         bits[i / 8] = (uint8_t)(bits[i / 8] | bit_at(&s->residual, i % n, i / n) << i % 8);
-    return true;
 }
 
 /* ------------------------------------------------------------------------------------------ restoring */
 
-/* n bits from bit `at` on; returns how many are set. */
-static size_t read_row(uint64_t *row, const uint8_t *bits, size_t at, int32_t n) {
-    size_t set = 0;
+/* What a run of bits holds. */
+typedef struct bits_seen {
+    bool ones, zeros;
+} bits_seen;
+
+/* n bits from bit `at` on. */
+static void read_row(uint64_t *row, const uint8_t *bits, size_t at, int32_t n, bits_seen *seen) {
     memset(row, 0, sizeof(bit_row));
     for (int32_t x = 0; x < n; x += 64, at += 64) {
-        const uint64_t low = get64(bits + at / 8) >> at % 8;
+        const uint64_t low = get64(bits + at / 8) >> at % 8, all = ~UINT64_C(0);
         const uint64_t word = at % 8 ? low | (uint64_t)bits[at / 8 + 8] << (64 - at % 8) : low;
-        row[x / 64] = n - x >= 64 ? word : word & ((UINT64_C(1) << (n - x)) - 1);
-        set += (size_t)__builtin_popcountll(row[x / 64]);
+        const uint64_t mask = n - x >= 64 ? all : (UINT64_C(1) << (n - x)) - 1;
+        row[x / 64] = word & mask;
+        seen->ones |= (word & mask) != 0;
+        seen->zeros |= (~word & mask) != 0;
     }
-    return set;
 }
 
 /* Past the last sample stands the last sample again. */
@@ -171,19 +170,19 @@ bool restore_flags(flag_scratch *s, const flag_source *from, uint8_t *flags) {
         memset(flags, from->all_void ? 0 : RQT_VALID, (size_t)n * (size_t)n);
         return true;
     }
-    const size_t stored = (size_t)from->width * (size_t)from->height;
-    size_t set = 0;
+    bits_seen seen = {false, false}, ignored = seen;
     if (from->validity) {
         for (int32_t y = 0; y < from->height; y++)
-            set += read_row(s->valid.row[y], from->validity, (size_t)y * (size_t)from->width, from->width);
-        if (set == 0 || set == stored) return false;
+            read_row(s->valid.row[y], from->validity, (size_t)y * (size_t)from->width, from->width, &seen);
+        if (!seen.ones || !seen.zeros) return false;
         repeat_bits(&s->valid, n, from->width, from->height);
     } else {
         memset(&s->valid, from->all_void ? 0 : 255, (size_t)n * sizeof s->valid.row[0]);
     }
     memset(&s->outline, 0, (size_t)n * sizeof s->outline.row[0]);
     if (from->outline) {
-        for (int32_t y = 0; y < n; y++) (void)read_row(s->residual.row[y], from->outline, (size_t)y * (size_t)n, n);
+        for (int32_t y = 0; y < n; y++)
+            read_row(s->residual.row[y], from->outline, (size_t)y * (size_t)n, n, &ignored);
         for (int c = 0; c < 4; c++)
             if (bit_at(&s->residual, c & 1 ? last : 0, c & 2 ? last : 0)) return false;
         code_outline(true, s, from->k, from->width, from->height);

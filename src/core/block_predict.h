@@ -6,14 +6,6 @@
 
 #include <math.h>
 
-/* A function compiled a second time for machines with AVX2: the same bytes, for it has the same operations (and
- * none fused). All that it calls must be compiled into it. (Sanitizers cannot follow the choice at load time.) */
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
-    !defined(__SANITIZE_THREAD__) && !defined(RQT_SCALAR)
-#define VECTOR_CLONES __attribute__((target_clones("avx2", "default")))
-#else
-#define VECTOR_CLONES
-#endif
 #define INLINE static inline __attribute__((always_inline))
 
 enum {
@@ -128,8 +120,8 @@ typedef struct flag_scratch {
     bit_grid valid, outline, residual;
 } flag_scratch;
 
-/* Outline bits of flags -> n*n residual bits, row by row; the corners do not count. False: there are none. */
-bool predict_outline(flag_scratch *scratch, int k, int32_t width, int32_t height, const uint8_t *flags,
+/* Outline bits of flags, in which the corners have none, -> n*n residual bits, row by row. */
+void predict_outline(flag_scratch *scratch, int k, int32_t width, int32_t height, const uint8_t *flags,
                      uint8_t *bits);
 
 typedef struct flag_source {

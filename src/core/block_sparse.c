@@ -28,31 +28,31 @@ typedef struct bit_source {
     size_t limit;
 } bit_source;
 
-/* The next bit, for the vertex dx, dy beside v: known by its place when writing, else read; past the end all are 0.
- */
-static inline void offer(kept_list *list, const bit_source *from, kept_vertex v, int32_t at, int32_t dx,
-                         int32_t dy) {
-    const size_t bit = list->offered++;
-    size_t kept;
+/* The next bit, if it is `due`, for the vertex dx, dy beside v: known by its place when writing, else read; past
+ * the end all are 0. Whether it is due, and what it is, no processor can guess: so there are no branches. */
+INLINE void offer(kept_list *list, const bit_source *from, kept_vertex v, int32_t at, int32_t dx, int32_t dy,
+                  bool due) {
+    const size_t bit = list->offered;
+    unsigned kept;
     if (from->kept) {
-        kept = from->kept[at];
+        kept = due & from->kept[at];
         list->bits[bit / 8] = (uint8_t)(list->bits[bit / 8] | kept << bit % 8);
     } else {
-        kept = bit < from->limit && (from->bits[bit / 8] >> bit % 8 & 1);
+        kept = bit < from->limit ? due & (unsigned)from->bits[bit / 8] >> bit % 8 : 0;
     }
+    list->offered = bit + due;
     list->vertex[list->count] = (kept_vertex){at, (int16_t)(v.x + dx), (int16_t)(v.y + dy)};
     list->count += kept;
 }
 
 /* The same if both its parents are kept: each of them asks. A side on the block's border has only one there: its
  * other has been counted before we begin. */
-static inline void offer_child(kept_list *list, const bit_source *from, kept_vertex v, int32_t n, int32_t dx,
-                               int32_t dy) {
+INLINE void offer_child(kept_list *list, const bit_source *from, kept_vertex v, int32_t n, int32_t dx, int32_t dy) {
     const int32_t at = v.at + dy * n + dx;
-    if (++list->seen[at] == 2) offer(list, from, v, at, dx, dy);
+    offer(list, from, v, at, dx, dy, ++list->seen[at] == 2);
 }
 
-static inline void walk(kept_list *list, int k, const bit_source *from) {
+INLINE void walk(kept_list *list, int k, const bit_source *from) {
     const int32_t n = (1 << k) + 1, last = n - 1;
     list_corners(list, n);
     list->offered = 0;
@@ -63,7 +63,7 @@ static inline void walk(kept_list *list, int k, const bit_source *from) {
     memset(list->seen + (ptrdiff_t)n * last, 1, (size_t)n);
     for (int32_t y = 0; y < n; y++) list->seen[y * n] = list->seen[y * n + last] = 1;
     size_t at = KEPT_CORNERS;
-    offer(list, from, list->vertex[0], last / 2 * n + last / 2, last / 2, last / 2);
+    offer(list, from, list->vertex[0], last / 2 * n + last / 2, last / 2, last / 2, true);
     for (int32_t q = last / 2; q > 0; q /= 2) {
         const size_t centres = list->count;
         for (; at < centres; at++) {

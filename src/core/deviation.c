@@ -2,10 +2,9 @@
  *
  * Two ways, both exact:
  *  - Inside the raster and without voids, the plane over a leg or hypotenuse of 2^m is a multiple of 2^-m at
- * samples: 2^m * (z - plane) is an integer, evaluated row by row by a loop that compilers turn into vector code; in
- * 32 bits where the terrain's relief allows, else in 64.
+ *    samples: 2^m * (z - plane) is an integer, in 32 bits where the terrain's relief allows, else in a double.
  *  - Clamped at the raster's edge, or with voids, a triangle is any triangle: its samples are found by its three
- *    edges and the plane has the denominator of twice its area.
+ *    edges and the plane has the denominator of twice its area; in doubles where that is exact, else in 128 bits.
  */
 #include "deviation.h"
 

@@ -12,6 +12,9 @@
 typedef int32_t lanes_i __attribute__((vector_size(4 * LANES)));
 typedef uint32_t lanes_u __attribute__((vector_size(4 * LANES)));
 typedef float lanes_f __attribute__((vector_size(4 * LANES)));
+typedef int32_t lanes_q __attribute__((vector_size(16))); /* four, to be made doubles */
+typedef double lanes_d __attribute__((vector_size(32)));
+typedef int64_t lanes_l __attribute__((vector_size(32)));
 
 #define NAME(x) x##_plain
 #define LANES_ABS(a) ((lanes_u)(((a) ^ ((a) >> 31)) - ((a) >> 31)))
@@ -26,6 +29,12 @@ static inline __attribute__((always_inline)) bool any_plain(lanes_u a) {
     return any != 0;
 }
 #define LANES_ANY(a) any_plain(a)
+#define RAISE_DOUBLES(most, d)                                               \
+    do {                                                                     \
+        const lanes_l size = (lanes_l)(d)&INT64_MAX;                         \
+        const lanes_l greater = (lanes_d)size > (most);                      \
+        (most) = (lanes_d)((size & greater) | ((lanes_l)(most) & ~greater)); \
+    } while (0)
 #include "error_kernels_rows.h"
 
 #include "error_kernels_cells.h"
@@ -33,6 +42,7 @@ static inline __attribute__((always_inline)) bool any_plain(lanes_u a) {
 #undef LANES_ABS
 #undef LANES_MAX
 #undef LANES_ANY
+#undef RAISE_DOUBLES
 
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(RQT_SCALAR)
 #include <immintrin.h>
@@ -43,6 +53,8 @@ static inline __attribute__((always_inline)) bool any_plain(lanes_u a) {
 #define LANES_ABS(a) ((lanes_u)_mm256_abs_epi32((__m256i)(a)))
 #define LANES_MAX(a, b) ((lanes_u)_mm256_max_epi32((__m256i)(a), (__m256i)(b)))
 #define LANES_ANY(a) (!_mm256_testz_si256((__m256i)(a), (__m256i)(a)))
+#define RAISE_DOUBLES(most, d) \
+    (most) = (lanes_d)_mm256_max_pd((__m256d)(lanes_d)((lanes_l)(d)&INT64_MAX), (__m256d)(most))
 #define LANES_AVX2 1
 #include "error_kernels_rows.h"
 

@@ -58,35 +58,55 @@ static uint32_t NAME(rows_32)(const int32_t *z, size_t stride, const row_spans *
     return out;
 }
 
+/* In doubles, whose sums are exact here: heights have 31 bits, planes m <= 20 more behind the point. */
 static uint64_t NAME(rows_64)(const int32_t *z, size_t stride, const row_spans *spans, int m, int64_t start,
                               int64_t gx, int64_t gy) {
-    int64_t most = 0;
+    const double scale = bits_double((uint64_t)(1023 - m) << 52);
+    const double slope = (double)gx * scale;
+    const lanes_d ramp = (lanes_d){0, 1, 2, 3} * slope;
+    lanes_d most = {0}, also = {0};
+    double rest = 0;
     for (int32_t k = 0; k < spans->rows; k++, z += stride) {
-        const int32_t end = NAME(span_right)(spans, k);
-        for (int32_t x = NAME(span_left)(spans, k); x <= end; x++) {
-            const int64_t d = z[x] * ((int64_t)1 << m) - (start + k * gy) - x * gx;
-            const int64_t size = d < 0 ? -d : d;
-            most = size > most ? size : most;
+        int32_t x = NAME(span_left)(spans, k);
+        const int32_t end = NAME(span_right)(spans, k) + 1;
+        double plane = (double)(start + k * gy + x * gx) * scale;
+        lanes_d planes = ramp + plane;
+        for (; x + 8 <= end; x += 8, plane += 8 * slope, planes += 8 * slope) {
+            lanes_q one, two;
+            memcpy(&one, z + x, sizeof one);
+            memcpy(&two, z + x + 4, sizeof two);
+            const lanes_d d = __builtin_convertvector(one, lanes_d) - planes;
+            const lanes_d e = __builtin_convertvector(two, lanes_d) - (planes + 4 * slope);
+            RAISE_DOUBLES(most, d);
+            RAISE_DOUBLES(also, e);
+        }
+        for (; x < end; x++, plane += slope) {
+            const double d = z[x] - plane, size = d < 0 ? -d : d;
+            rest = size > rest ? size : rest;
         }
     }
-    return (uint64_t)most;
+    for (int i = 0; i < 4; i++) {
+        rest = most[i] > rest ? most[i] : rest;
+        rest = also[i] > rest ? also[i] : rest;
+    }
+    return (uint64_t)(rest * bits_double((uint64_t)(1023 + m) << 52));
 }
 
+/* max over n samples of |(z[i] - base) * area - (start + i * slope)|; see error_kernels.h. */
 static double NAME(row_double)(const int32_t *z, int32_t n, int32_t base, double area, double start, double slope) {
-    /* Four maxima side by side: those of doubles are not reordered by the compiler. */
-    double most[4] = {0, 0, 0, 0};
+    lanes_d most = {0}, plane = (lanes_d){0, 1, 2, 3} * slope + start;
+    double rest = 0;
     int32_t i = 0;
-    for (; i + 4 <= n; i += 4)
-        for (int lane = 0; lane < 4; lane++) {
-            const double d = ((double)z[i + lane] - base) * area - (start + (double)(i + lane) * slope);
-            const double size = d < 0 ? -d : d;
-            most[lane] = size > most[lane] ? size : most[lane];
-        }
-    for (; i < n; i++) {
-        const double d = ((double)z[i] - base) * area - (start + (double)i * slope);
-        const double size = d < 0 ? -d : d;
-        most[0] = size > most[0] ? size : most[0];
+    for (; i + 4 <= n; i += 4, plane += 4 * slope) {
+        lanes_q four;
+        memcpy(&four, z + i, sizeof four);
+        const lanes_d d = (__builtin_convertvector(four, lanes_d) - base) * area - plane;
+        RAISE_DOUBLES(most, d);
     }
-    for (int lane = 1; lane < 4; lane++) most[0] = most[lane] > most[0] ? most[lane] : most[0];
-    return most[0];
+    for (; i < n; i++) {
+        const double d = ((double)z[i] - base) * area - (start + i * slope), size = d < 0 ? -d : d;
+        rest = size > rest ? size : rest;
+    }
+    for (int lane = 0; lane < 4; lane++) rest = most[lane] > rest ? most[lane] : rest;
+    return rest;
 }

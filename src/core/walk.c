@@ -26,14 +26,6 @@ typedef struct half {
 
 /* ----------------------------------------------------------------------------------------------- selection */
 
-/* One binary for every machine: the wider instructions where the processor has them, the same bytes everywhere. */
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
-    !defined(__SANITIZE_THREAD__) && !defined(RQT_SCALAR)
-#define VECTOR_CLONES __attribute__((target_clones("avx2", "default")))
-#else
-#define VECTOR_CLONES
-#endif
-
 /* chosen = error > eps or a flag of the mask. Returns the flags that all of them have: corners of leaves are
  * vertices that are chosen, or corners of the block. */
 VECTOR_CLONES

@@ -123,12 +123,12 @@ bool import_database_probe(const import_job *job, const char *terrain) {
     return ok;
 }
 
-/* Bytes of a page in a new file, for what blocks of this k weigh. Up to 65^2 samples that is 1 to 5 KB: several
- * share a large page, where most of a small one would stay empty (a file of 4097^2 samples: 13.8 MB, not 15.5).
- * 129^2 are about 10 KB, which fill small pages best (11.6 MB, not 14.1). 257^2 are 40 KB and more: fewer links
- * between pages, same size. */
+/* Bytes of a page in a new file, for what blocks of this k weigh. Up to 33^2 samples that is less than 1 KB: many
+ * share a large page. 65^2 are 1 to 3 KB, several to a page. 129^2 are 4 to 12 KB and take whole pages, of which
+ * the last is half empty: so small ones (seven DEMs: 8.56 MB with 2 KB, 9.15 with 4, 12.3 with 16; a query takes
+ * the same time). */
 static int page_bytes(int k) {
-    return k == 7 ? 4096 : 16384;
+    return k > 6 ? 2048 : k == 6 ? 8192 : 16384;
 }
 
 bool import_database_begin(const import_job *job, int k, int64_t page_cache, import_database *d) {

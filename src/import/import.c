@@ -15,8 +15,6 @@
 #include <time.h>
 #include <unistd.h>
 
-#define MIB 1048576.0
-
 /* ------------------------------------------------------------------------------ what the parts call back -- */
 bool import_refuse(const import_job *job, const char *format, ...) {
     va_list list;
@@ -68,7 +66,7 @@ const char *import_gdal_version(void) {
 void import_options_init(import_options *options) {
     long cores = sysconf(_SC_NPROCESSORS_ONLN), pages = sysconf(_SC_PHYS_PAGES), page = sysconf(_SC_PAGE_SIZE);
     int64_t half = pages > 0 && page > 0 ? (int64_t)pages * page / 2 : INT64_MAX;
-    *options = (import_options){.k = 6,
+    *options = (import_options){.k = 7,
                                 .void_tol = 1,
                                 .jobs = cores < 1    ? 1
                                         : cores > 64 ? 64
@@ -147,22 +145,6 @@ static int64_t sample_count(const import_work *m) {
     return (int64_t)m->mosaic.lattice.width * m->mosaic.lattice.height;
 }
 
-/* Minimal errors are computed from the whole terrain at once, when everything else is written and let go. */
-static bool check_minimal(const import_work *m) {
-    if (!m->job.options->minimal) return true;
-    const rqt_lattice *l = &m->mosaic.lattice;
-    const double minimal = (double)store_minimal_bytes(l, m->k, true), need = minimal + IMPORT_PROCESS_BYTES;
-    if (minimal > (double)STORE_METHOD_MEMORY)
-        return import_refuse(&m->job,
-                             "%d x %d samples: their minimal errors take %.0f MiB of memory, and %.0f are allowed; "
-                             "import without --minimal",
-                             l->width, l->height, ceil(minimal / MIB), (double)STORE_METHOD_MEMORY / MIB);
-    if (need <= (double)m->job.options->memory) return true;
-    return import_refuse(&m->job,
-                         "%d x %d samples need %.0f MiB of memory to import with --minimal; --memory allows %.0f",
-                         l->width, l->height, ceil(need / MIB), floor((double)m->job.options->memory / MIB));
-}
-
 static bool describe(import_work *m, const char *const *paths) {
     m->sources = calloc((size_t)m->count, sizeof *m->sources);
     if (!m->sources) return import_no_memory(&m->job, "describing the sources");
@@ -175,8 +157,7 @@ static bool describe(import_work *m, const char *const *paths) {
     m->k = m->job.options->k < m->mosaic.lattice.K ? m->job.options->k : m->mosaic.lattice.K;
     m->cost =
         (rqt_void_cost){.cell = import_crs_cell(&m->crs, &m->mosaic.placement), .c = m->job.options->void_tol};
-    return check_minimal(m) &&
-           import_plan_make(&m->job, m->sources, m->count, &m->mosaic, m->k, m->force, &m->plan);
+    return import_plan_make(&m->job, m->sources, m->count, &m->mosaic, m->k, m->force, &m->plan);
 }
 
 static void tell_extreme(const import_work *m, double value, int64_t times) {

@@ -41,13 +41,6 @@ compile "$OUT/mirror_terrain" "" tests/bench/mirror_terrain.c
 compile "$OUT/bench" "$(gdal-config --cflags) -lsqlite3 $(gdal-config --libs) -lm" \
     tests/bench/bench.c tests/bench/bench_table.c
 
-walk_peer=
-if [[ -e $BUILD/librqt.a ]]; then
-    [[ ! $BUILD/librqt.a -nt $OUT/bench_walk ]] || rm -f "$OUT/bench_walk"
-    compile "$OUT/bench_walk" "-Isrc/core $BUILD/librqt.a -lzstd -lm" tests/bench/bench_walk.c tests/bench/bench_table.c
-    walk_peer=$OUT/bench_walk
-fi
-
 if [[ ! -e $raster || $OUT/make_terrain -nt $raster ]]; then
     echo "Generating $side x $side samples ..." >&2
     "$OUT/make_terrain" "$K" "$raster"
@@ -96,10 +89,31 @@ fi
 machine="$(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo | head -n 1), $(nproc) cores"
 data="generated fBm (H 0.9, seed 1), $side x $side int16, 30 m cells, 0 to 4000 m"
 "$OUT/bench" "$OUT/fbm.gpkg" "$RQT_SO" "$tiff" "$times" "$OUT/bench.csv" "$machine" "$data" "${large[@]}"
-if [[ $walk_peer ]]; then
+if [[ -e $BUILD/librqt.a ]]; then
+    core() { # NAME LIBRARIES: a program on librqt.a alone
+        [[ ! $BUILD/librqt.a -nt $OUT/$1 ]] || rm -f "$OUT/$1"
+        compile "$OUT/$1" "-Isrc/core $BUILD/librqt.a $2 -lzstd -lm" "tests/bench/$1.c" tests/bench/bench_table.c
+    }
+    core bench_errors ""
+    core bench_walk ""
+    echo
+    echo "Exact errors and saturation, one core (aim: 60 Msamples/s, the same bytes)"
+    "$OUT/bench_errors" "$raster" "$side" "$RUNS"
     echo
     echo "The walk over decoded blocks in memory, one thread, beside RTIN's recursion in C over the same errors"
-    "$walk_peer" "$K" "$raster"
+    echo "(aim: 120 Mtriangles/s, 1.5 times RTIN in C)"
+    "$OUT/bench_walk" "$K" "$raster" | tee "$OUT/walk.txt"
+    if [[ -d $BUILD/peers/node_modules/@mapbox/martini ]] && command -v node >/dev/null; then
+        echo
+        echo "Beside @mapbox/martini's getMesh on the same $side x $side samples (aim: 6 times)"
+        node tests/bench/peers/martini.mjs "$BUILD/peers/node_modules" "$raster" "$side" 1,2,5,10,20 >"$OUT/martini.txt"
+        awk 'NR == FNR { rate[$1] = $3; count[$1] = $2; next }
+             $1 == "whole" { match($0, /strip [0-9.]+ Mtri/); ours = substr($0, RSTART + 6, RLENGTH - 11)
+                 printf "  eps %2d: strip %6.1f Mtriangles/s; getMesh %6.1f (%d triangles): %.1f times\n", $3, ours, rate[$3], count[$3], ours / rate[$3] }' \
+            "$OUT/martini.txt" "$OUT/walk.txt"
+    else
+        echo "(martini is not installed: make peers brings it)"
+    fi
 fi
 echo
 echo "The same figures: $OUT/bench.csv"
