@@ -446,6 +446,19 @@ for moment in 10 40 70 writing; do
         done
     done
 done
+python3 - t.gpkg <<'PY'
+import shutil, sqlite3, sys # a writer that was killed when part of what it wrote was in the file
+shutil.copy(sys.argv[1], "writing.gpkg")
+db = sqlite3.connect("writing.gpkg", isolation_level=None)
+db.executescript("PRAGMA journal_mode = DELETE; PRAGMA cache_size = 1; BEGIN; DELETE FROM rqt_terrain; CREATE TABLE x AS "
+                 "WITH RECURSIVE c(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM c WHERE i < 1000) SELECT randomblob(1000) FROM c")
+shutil.copy("writing.gpkg", "hot.gpkg"); shutil.copy("writing.gpkg-journal", "hot.gpkg-journal")
+PY
+prints "info of a database whose writer was killed rolls back" "my.hole-2" info hot.gpkg
+[ ! -e hot.gpkg-journal ]; ok "... and leaves no journal" $? "$(ls -l hot*)"
+rm -f f.gpkg*; (ulimit -f 2000; "$RQT" import --memory 4000 big.bil f.gpkg >out 2>err)
+[ $? = 1 ] && grep -q 'f.gpkg' err && [ -z "$(ls | grep '^f.gpkg')" ]
+ok "import beyond the limit of file sizes: a sentence, and nothing left" $? "$(cat out err; ls -l f.gpkg* 2>&1)"
 rqt import --name big --replace big.bil k.gpkg; [ $status = 0 ]; ok "importing again works after all that" $? "$(cat err)"
 rqt check k.gpkg; [ $status = 0 ] && grep -q '^big: sound' out; ok "... and is sound" $? "$(cat out err)"
 "$RQT" mesh k.gpkg --terrain big --eps 0 -o stopped.gpkg 2>/dev/null & pid=$!

@@ -173,6 +173,8 @@ static int run(int argc, char **argv) {
     const struct sigaction action = {.sa_handler = stop, .sa_flags = (int)SA_RESETHAND};
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
+    /* A limit on the size of files (ulimit -f) is a full disk, of which we and SQLite know how to tell. */
+    signal(SIGXFSZ, SIG_IGN);
 
     import_report report;
     char message[2048];

@@ -30,6 +30,14 @@ int cli_fail_store(int code, char *sentence) {
     return CLI_FAILED;
 }
 
+static int open_with(const char *path, int flags, sqlite3 **db) {
+    const int code = sqlite3_open_v2(path, db, flags, NULL);
+    if (code != SQLITE_OK) return code;
+    sqlite3_busy_timeout(*db, BUSY_MILLISECONDS);
+    /* The first look into the file: it finds out whether it is a database at all. */
+    return sqlite3_exec(*db, "SELECT count(*) FROM sqlite_schema", NULL, NULL, NULL);
+}
+
 sqlite3 *cli_open(const char *path) {
     struct stat file;
     sqlite3 *db = NULL;
@@ -42,11 +50,13 @@ sqlite3 *cli_open(const char *path) {
         cli_fail("%s is a folder and not a database", path);
         return NULL;
     }
-    int code = sqlite3_open_v2(path, &db, SQLITE_OPEN_READONLY, NULL);
-    if (code == SQLITE_OK) {
-        sqlite3_busy_timeout(db, BUSY_MILLISECONDS);
-        /* The first look into the file: it finds out whether it is a database at all. */
-        code = sqlite3_exec(db, "SELECT count(*) FROM sqlite_schema", NULL, NULL, NULL);
+    int code = open_with(path, SQLITE_OPEN_READONLY, &db);
+    if (code == SQLITE_READONLY) {
+        /* An import was killed while it wrote a new file: its journal is to be rolled back first, which takes a
+         * connection that may write. */
+        sqlite3_close(db);
+        code = open_with(path, SQLITE_OPEN_READWRITE, &db);
+        if (code == SQLITE_OK) code = sqlite3_exec(db, "PRAGMA query_only = 1", NULL, NULL, NULL);
     }
     if (code != SQLITE_OK) {
         if (code == SQLITE_NOTADB)

@@ -10,7 +10,7 @@
  * the same results (no operation is fused). All that such a function calls must be compiled into it. Sanitizers
  * cannot follow the choice at load time: their build runs the plain loops. */
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
-    !defined(RQT_SCALAR)
+    !defined(__SANITIZE_THREAD__) && !defined(RQT_SCALAR)
 #define VECTOR_CLONES __attribute__((target_clones("avx2", "default")))
 #else
 #define VECTOR_CLONES
