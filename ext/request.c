@@ -8,7 +8,7 @@ bool request_number(sqlite3_value *value, const char *what, double *number, char
     const int type = value ? sqlite3_value_numeric_type(value) : SQLITE_NULL;
     *number = 0;
     if (type == SQLITE_INTEGER || type == SQLITE_FLOAT) {
-        *number = sqlite3_value_double(value);
+        *number = sqlite3_value_double(value) + 0.0; /* -0.0 is 0: increments compare eps bit for bit */
         if (!isnan(*number)) return true;
     }
     (void)fail(error, "%s must be a number; it is %s", what,

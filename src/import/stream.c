@@ -53,6 +53,14 @@ static void note_failure(streaming *w, rqt_status status) {
     pthread_mutex_unlock(&w->lock);
 }
 
+/* Has another item of this task failed? Then there is no use in going on. */
+static bool has_failed(streaming *w) {
+    pthread_mutex_lock(&w->lock);
+    const bool failed = w->failed != RQT_OK;
+    pthread_mutex_unlock(&w->lock);
+    return failed;
+}
+
 /* Did the task that just ended go well? */
 static bool went_well(const streaming *w) {
     switch (w->failed) {
@@ -92,14 +100,14 @@ static void note_made(streaming *w, const maker *m, rqt_status status) {
 static void build_tile(void *context, int worker, int32_t tile) {
     streaming *w = context;
     maker m = {.w = w, .tools = &w->tools[worker]};
-    if (w->failed != RQT_OK) return;
+    if (has_failed(w)) return;
     note_made(w, &m, rqt_build_tile(w->s->build, &w->band, tile, &m.tools->block, keep_block, &m));
 }
 
 static void build_coarse(void *context, int worker, int32_t cell) {
     streaming *w = context;
     maker m = {.w = w, .tools = &w->tools[worker]};
-    if (w->failed != RQT_OK) return;
+    if (has_failed(w)) return;
     note_made(w, &m, rqt_build_coarse(w->s->build, w->s->sweep, w->level, cell, &m.tools->block, keep_block, &m));
 }
 
