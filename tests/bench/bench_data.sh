@@ -3,7 +3,7 @@
 #
 # For every int16 raster of a million samples or more: the COG (ZSTD, predictor 2, overviews) and the database with exact
 # errors of all levels; then what their blocks weigh part by part, and the wire format's bytes and speed.
-#   BLOCK=6   block size of the databases
+#   BLOCK=K   block size of the databases, when it is not to be the default
 set -euo pipefail
 data=$(realpath "${1:?usage: bench_data.sh DIRECTORY}")
 cd "$(dirname "$0")/../.."
@@ -24,7 +24,7 @@ for file in "$data"/*.tif "$data"/*.hgt.zip; do
     name=${name%%.*}
     gdal_translate -q -of COG -co COMPRESS=ZSTD -co PREDICTOR=2 -co OVERVIEWS=AUTO "$file" "$OUT/$name.tif"
     rm -f "$OUT/$name.gpkg" "$OUT/$name.tif.aux.xml"
-    "$RQT" import --block "${BLOCK:-6}" --name "$name" "$file" "$OUT/$name.gpkg" >/dev/null 2>&1
+    "$RQT" import ${BLOCK:+--block "$BLOCK"} --name "$name" "$file" "$OUT/$name.gpkg" >/dev/null 2>&1
     cog=$(stat -c %s "$OUT/$name.tif") database=$(stat -c %s "$OUT/$name.gpkg")
     printf '%-24s %12d %12d %12d %8s\n' "$name" $((width * height)) "$cog" "$database" \
         "$(awk "BEGIN { printf \"%.2f\", $database / $cog }")"

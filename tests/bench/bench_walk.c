@@ -15,7 +15,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { BLOCK_K = 6, WINDOW_SIDE = 512 };
+enum { BLOCK_K = 7, WINDOW_SIDE = 512 };
 
 static const double EPS[] = {1, 2, 5, 10, 20};
 
