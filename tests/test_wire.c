@@ -186,7 +186,7 @@ static void the_patch_of_the_query_comes_back_in_its_order(void **state) {
     meshes = empty_meshes = 0;
     for_terrains("round trips", 84, check_meshes);
     printf("%zu meshes, %zu of them empty\n", meshes, empty_meshes);
-    assert_true(meshes > 1000 && empty_meshes > 10 && empty_meshes < 3 * meshes / 4);
+    assert_true(meshes > 1000 && empty_meshes > 10 && meshes - empty_meshes > 1000);
 }
 
 /* Step by step from infinity, some steps left out: each time the mesh as asked for at once. */
