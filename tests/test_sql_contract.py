@@ -30,7 +30,7 @@ SCALARS = {  # argument counts, deterministic
     "rqt_block_check": ([1], True),
     "rqt_block_dump": ([1], True),
 }
-LATER = ["rqt_profile", "rqt_area", "rqt_delta", "rqt_view", "rqt_view_triangles", "rqt_view_strip", "rqt_view_explain",
+LATER = ["rqt_profile", "rqt_area", "rqt_view", "rqt_view_triangles", "rqt_view_strip", "rqt_view_explain",
          "rqt_view_mesh", "rqt_corridor"]
 DETERMINISTIC, DIRECTONLY, INNOCUOUS = 0x800, 0x80000, 0x200000
 
