@@ -75,6 +75,17 @@ static inline double get_double(const uint8_t *p) {
 /* FORMAT.md, "Checksum", with the 8 bytes at `field` taken as zero (field is a multiple of 8). checksum.c */
 uint64_t checksum64(const uint8_t *bytes, size_t size, size_t field);
 
+/* What the header of every mesh format says alike, at offsets 32 to 111 (FORMAT.md, "Mesh"). mesh_format.c */
+typedef struct mesh_frame {
+    rqt_placement placement;
+    rqt_unit unit;
+    int32_t srid;
+    double eps;
+} mesh_frame;
+void mesh_frame_put(const mesh_frame *frame, uint8_t *bytes);
+mesh_frame mesh_frame_get(const uint8_t *bytes);
+bool placement_is_valid(const rqt_placement *placement);
+
 /* Put a sentence together; cuts what does not fit. message may be NULL. sentence.c */
 void sentence_begin(rqt_message *message, const char *text);
 void sentence_add(rqt_message *message, const char *text);

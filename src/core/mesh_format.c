@@ -37,6 +37,39 @@ size_t rqt_mesh_bytes(const rqt_mesh_header *header) {
                     header->index_count * INDEX_BYTES);
 }
 
+/* Where the formats of meshes, 'rqt' too, keep what makes places and metres of their integers. */
+void mesh_frame_put(const mesh_frame *f, uint8_t *bytes) {
+    put_double(bytes + AT_PLACEMENT, f->placement.x0);
+    put_double(bytes + AT_PLACEMENT + 8, f->placement.y0);
+    put_double(bytes + AT_PLACEMENT + 16, f->placement.dx);
+    put_double(bytes + AT_PLACEMENT + 24, f->placement.dy);
+    put64(bytes + AT_Z0, (uint64_t)f->unit.z0);
+    put32(bytes + AT_D, (uint32_t)f->unit.d);
+    put32(bytes + AT_NUMERATOR, (uint32_t)f->unit.numerator);
+    put32(bytes + AT_DENOMINATOR, (uint32_t)f->unit.denominator);
+    put32(bytes + AT_SRID, (uint32_t)f->srid);
+    put_double(bytes + AT_SCALE, f->unit.scale);
+    put_double(bytes + AT_OFFSET, f->unit.offset);
+    put_double(bytes + AT_EPS, f->eps);
+}
+
+mesh_frame mesh_frame_get(const uint8_t *bytes) {
+    return (mesh_frame){.placement = {get_double(bytes + AT_PLACEMENT), get_double(bytes + AT_PLACEMENT + 8),
+                                      get_double(bytes + AT_PLACEMENT + 16), get_double(bytes + AT_PLACEMENT + 24)},
+                        .unit = {.z0 = (int64_t)get64(bytes + AT_Z0),
+                                 .d = (int32_t)get32(bytes + AT_D),
+                                 .numerator = (int32_t)get32(bytes + AT_NUMERATOR),
+                                 .denominator = (int32_t)get32(bytes + AT_DENOMINATOR),
+                                 .scale = get_double(bytes + AT_SCALE),
+                                 .offset = get_double(bytes + AT_OFFSET)},
+                        .srid = (int32_t)get32(bytes + AT_SRID),
+                        .eps = get_double(bytes + AT_EPS)};
+}
+
+bool placement_is_valid(const rqt_placement *p) {
+    return isfinite(p->x0) && isfinite(p->y0) && isfinite(p->dx) && isfinite(p->dy) && p->dx != 0 && p->dy != 0;
+}
+
 void rqt_mesh_encode(const rqt_mesh_header *header, const rqt_patch_vertex *vertices, const uint32_t *indices,
                      uint8_t *bytes) {
     memset(bytes, 0, RQT_MESH_HEADER_BYTES);
@@ -45,18 +78,7 @@ void rqt_mesh_encode(const rqt_mesh_header *header, const rqt_patch_vertex *vert
     bytes[AT_KIND] = (uint8_t)header->kind;
     put64(bytes + AT_VERTEX_COUNT, header->vertex_count);
     put64(bytes + AT_INDEX_COUNT, header->index_count);
-    put_double(bytes + AT_PLACEMENT, header->placement.x0);
-    put_double(bytes + AT_PLACEMENT + 8, header->placement.y0);
-    put_double(bytes + AT_PLACEMENT + 16, header->placement.dx);
-    put_double(bytes + AT_PLACEMENT + 24, header->placement.dy);
-    put64(bytes + AT_Z0, (uint64_t)header->unit.z0);
-    put32(bytes + AT_D, (uint32_t)header->unit.d);
-    put32(bytes + AT_NUMERATOR, (uint32_t)header->unit.numerator);
-    put32(bytes + AT_DENOMINATOR, (uint32_t)header->unit.denominator);
-    put32(bytes + AT_SRID, (uint32_t)header->srid);
-    put_double(bytes + AT_SCALE, header->unit.scale);
-    put_double(bytes + AT_OFFSET, header->unit.offset);
-    put_double(bytes + AT_EPS, header->eps);
+    mesh_frame_put(&(mesh_frame){header->placement, header->unit, header->srid, header->eps}, bytes);
     uint8_t *p = bytes + RQT_MESH_HEADER_BYTES;
     for (uint64_t i = 0; i < header->vertex_count; i++, p += VERTEX_BYTES) {
         put32(p, (uint32_t)vertices[i].col);
@@ -76,24 +98,15 @@ static void get_header(const uint8_t *bytes, rqt_mesh_header *h) {
     h->kind = (rqt_mesh_kind)bytes[AT_KIND];
     h->vertex_count = get64(bytes + AT_VERTEX_COUNT);
     h->index_count = get64(bytes + AT_INDEX_COUNT);
-    h->placement.x0 = get_double(bytes + AT_PLACEMENT);
-    h->placement.y0 = get_double(bytes + AT_PLACEMENT + 8);
-    h->placement.dx = get_double(bytes + AT_PLACEMENT + 16);
-    h->placement.dy = get_double(bytes + AT_PLACEMENT + 24);
-    h->unit.z0 = (int64_t)get64(bytes + AT_Z0);
-    h->unit.d = (int32_t)get32(bytes + AT_D);
-    h->unit.numerator = (int32_t)get32(bytes + AT_NUMERATOR);
-    h->unit.denominator = (int32_t)get32(bytes + AT_DENOMINATOR);
-    h->srid = (int32_t)get32(bytes + AT_SRID);
-    h->unit.scale = get_double(bytes + AT_SCALE);
-    h->unit.offset = get_double(bytes + AT_OFFSET);
-    h->eps = get_double(bytes + AT_EPS);
+    const mesh_frame frame = mesh_frame_get(bytes);
+    h->placement = frame.placement;
+    h->unit = frame.unit;
+    h->srid = frame.srid;
+    h->eps = frame.eps;
 }
 
 static bool header_is_sound(const rqt_mesh_header *h) {
-    const rqt_placement *p = &h->placement;
-    if (!isfinite(p->x0) || !isfinite(p->y0) || !isfinite(p->dx) || !isfinite(p->dy) || p->dx == 0 || p->dy == 0)
-        return false;
+    if (!placement_is_valid(&h->placement)) return false;
     if (!rqt_unit_is_valid(&h->unit) || !(h->eps >= 0)) return false; /* eps: infinity is sound, NaN is not */
     if (h->kind == RQT_MESH_STRIP) return h->index_count == 0 || h->index_count >= 3;
     return h->kind == RQT_MESH_INDEXED && h->index_count % 3 == 0;

@@ -2,7 +2,6 @@
  * increment knows the mesh that it begins from. FORMAT.md, "Wire". */
 #include "wire_walk.h"
 
-#include <math.h>
 #include <zstd.h>
 
 enum {
@@ -13,15 +12,6 @@ enum {
     AT_CHECKSUM = 8,
     AT_VERTEX_COUNT = 16,
     AT_TRIANGLE_COUNT = 24,
-    AT_PLACEMENT = 32,
-    AT_Z0 = 64,
-    AT_D = 72,
-    AT_NUMERATOR = 76,
-    AT_DENOMINATOR = 80,
-    AT_SRID = 84,
-    AT_SCALE = 88,
-    AT_OFFSET = 96,
-    AT_EPS = 104,
     AT_WIDTH = 112,
     AT_HEIGHT = 116,
     AT_PAYLOAD = 120,
@@ -53,18 +43,7 @@ void wire_put_header(const rqt_wire_header *h, uint64_t payload, uint8_t *bytes)
     bytes[AT_K] = (uint8_t)h->k;
     put64(bytes + AT_VERTEX_COUNT, h->vertex_count);
     put64(bytes + AT_TRIANGLE_COUNT, h->triangle_count);
-    put_double(bytes + AT_PLACEMENT, h->placement.x0);
-    put_double(bytes + AT_PLACEMENT + 8, h->placement.y0);
-    put_double(bytes + AT_PLACEMENT + 16, h->placement.dx);
-    put_double(bytes + AT_PLACEMENT + 24, h->placement.dy);
-    put64(bytes + AT_Z0, (uint64_t)h->unit.z0);
-    put32(bytes + AT_D, (uint32_t)h->unit.d);
-    put32(bytes + AT_NUMERATOR, (uint32_t)h->unit.numerator);
-    put32(bytes + AT_DENOMINATOR, (uint32_t)h->unit.denominator);
-    put32(bytes + AT_SRID, (uint32_t)h->srid);
-    put_double(bytes + AT_SCALE, h->unit.scale);
-    put_double(bytes + AT_OFFSET, h->unit.offset);
-    put_double(bytes + AT_EPS, h->eps);
+    mesh_frame_put(&(mesh_frame){h->placement, h->unit, h->srid, h->eps}, bytes);
     put32(bytes + AT_WIDTH, (uint32_t)h->lattice.width);
     put32(bytes + AT_HEIGHT, (uint32_t)h->lattice.height);
     put64(bytes + AT_PAYLOAD, payload);
@@ -79,21 +58,15 @@ uint64_t wire_payload_of(const uint8_t *bytes) {
 }
 
 static void get_header(const uint8_t *bytes, rqt_wire_header *h) {
+    const mesh_frame frame = mesh_frame_get(bytes);
     *h = (rqt_wire_header){.is_delta = bytes[AT_KIND] == KIND_DELTA,
                            .k = bytes[AT_K],
                            .vertex_count = get64(bytes + AT_VERTEX_COUNT),
                            .triangle_count = get64(bytes + AT_TRIANGLE_COUNT),
-                           .placement = {get_double(bytes + AT_PLACEMENT), get_double(bytes + AT_PLACEMENT + 8),
-                                         get_double(bytes + AT_PLACEMENT + 16),
-                                         get_double(bytes + AT_PLACEMENT + 24)},
-                           .unit = {.z0 = (int64_t)get64(bytes + AT_Z0),
-                                    .d = (int32_t)get32(bytes + AT_D),
-                                    .numerator = (int32_t)get32(bytes + AT_NUMERATOR),
-                                    .denominator = (int32_t)get32(bytes + AT_DENOMINATOR),
-                                    .scale = get_double(bytes + AT_SCALE),
-                                    .offset = get_double(bytes + AT_OFFSET)},
-                           .eps = get_double(bytes + AT_EPS),
-                           .srid = (int32_t)get32(bytes + AT_SRID),
+                           .placement = frame.placement,
+                           .unit = frame.unit,
+                           .eps = frame.eps,
+                           .srid = frame.srid,
                            .eps_from = get_double(bytes + AT_EPS_FROM),
                            .from = get64(bytes + AT_FROM)};
 }
@@ -110,12 +83,10 @@ rqt_status rqt_wire_info(const uint8_t *bytes, size_t size, rqt_wire_header *hea
         return corrupt(message, "the mesh's checksum is wrong: its bytes have changed");
     rqt_wire_header h;
     get_header(bytes, &h);
-    const rqt_placement *p = &h.placement;
     const uint32_t width = get32(bytes + AT_WIDTH), height = get32(bytes + AT_HEIGHT);
     if (rqt_lattice_init(&h.lattice, width, height) != RQT_OK || h.k > h.lattice.K || h.k > RQT_MAX_BLOCK_K)
         return corrupt(message, "the mesh's raster has an impossible size");
-    if (!isfinite(p->x0) || !isfinite(p->y0) || !isfinite(p->dx) || !isfinite(p->dy) || p->dx == 0 || p->dy == 0)
-        return corrupt(message, "the mesh's placement is not one");
+    if (!placement_is_valid(&h.placement)) return corrupt(message, "the mesh's placement is not one");
     if (!rqt_unit_is_valid(&h.unit)) return corrupt(message, "the mesh's unit of height is not one");
     if (!(h.eps >= 0) || !(h.eps_from >= 0) || (h.is_delta ? h.eps_from < h.eps : h.eps_from != 0 || h.from != 0))
         return corrupt(message, "the mesh's eps is not one");
