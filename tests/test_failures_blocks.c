@@ -1,5 +1,5 @@
-/* test_failures_blocks.c - F16 to F18, F21, F40, F43, F44 and F47: voids, extents, thresholds and blocks on which meshes
- * crack, lose their outline or read past their end.
+/* test_failures_blocks.c - F16 to F18, F21, F40, F43, F44 and F47: voids, extents, thresholds and blocks on which
+ * meshes crack, lose their outline or read past their end.
  *
  * As in test_failures_heights.c: rasters made for the case, meshes of rqt, and the independent verifier's word. */
 #include "test_failures_support.h"
@@ -70,7 +70,8 @@ static void F16_voids_at_block_corners_centres_and_borders_keep_the_exact_outlin
         r.name = "one void";
         check_voids(r);
     }
-    for (int line = 0; line < 4; line++) { /* whole rows and columns: of the raster's border, of a block's, beside it */
+    for (int line = 0; line < 4;
+         line++) { /* whole rows and columns: of the raster's border, of a block's, beside it */
         static const int at[] = {0, 16, 32, 15};
         for (int down = 0; down < 2; down++) {
             raster r = hills_of(33, 33);
@@ -157,8 +158,8 @@ static void F21_border_copies_are_equal_byte_for_byte(void **state) {
                         const rqt_vertex v = {s->place.x + (int32_t)(i % cells) * s->place.stride,
                                               s->place.y + (int32_t)(i / cells) * s->place.stride};
                         const rqt_block *block = &t.d.scratch;
-                        const bool kept = !block->sparse || block->error[i] > block->floor ||
-                                          block->flags[i] & RQT_OUTLINE;
+                        const bool kept =
+                            !block->sparse || block->error[i] > block->floor || block->flags[i] & RQT_OUTLINE;
                         rqt_patch_vertex *before = &seen[(size_t)v.y * (size_t)(side + 1) + (size_t)v.x];
                         /* past the raster nobody asks */
                         if (!kept || v.x >= width || v.y >= 33) continue;
@@ -182,7 +183,8 @@ static void F21_border_copies_are_equal_byte_for_byte(void **state) {
     assert_true(compared > 2000);
 }
 
-/* F40. 2 x 2, one row, one column, 2^k + 1 and its neighbours, long and short: the mesh ends where the raster ends. */
+/* F40. 2 x 2, one row, one column, 2^k + 1 and its neighbours, long and short: the mesh ends where the raster ends.
+ */
 static void F40_meshes_of_every_extent_end_with_the_raster(void **state) {
     (void)state;
     random_begin("F40");
@@ -194,8 +196,8 @@ static void F40_meshes_of_every_extent_end_with_the_raster(void **state) {
         check_raster(hills_of(extents[n][0], extents[n][1]), eps, 4);
 }
 
-/* F43. Selected is what errs more than eps: at a stored error itself its vertices are out, a double below it they are
- * in. The number of vertices is counted from the errors, not by a query. */
+/* F43. Selected is what errs more than eps: at a stored error itself its vertices are out, a double below it they
+ * are in. The number of vertices is counted from the errors, not by a query. */
 static void F43_eps_below_at_and_above_every_stored_error(void **state) {
     (void)state;
     random_begin("F43");
@@ -213,8 +215,8 @@ static void F43_eps_below_at_and_above_every_stored_error(void **state) {
                 const double eps = side ? nextafter(stored_error, side < 0 ? 0 : INFINITY) : stored_error;
                 size_t wanted = 0;
                 for (int i = 0; i < 33 * 33; i++)
-                    wanted += rqt_code_metres(rqt_errors_at(errors, (rqt_vertex){i % 33, i / 33}, &(bool){false})) >
-                              eps;
+                    wanted +=
+                        rqt_code_metres(rqt_errors_at(errors, (rqt_vertex){i % 33, i / 33}, &(bool){false})) > eps;
                 const size_t seen = check_mesh(&t, eps);
                 CHECK(seen == wanted, "eps %.17g beside %.17g: %zu vertices, should be %zu", eps, stored_error,
                       seen, wanted);
@@ -225,8 +227,8 @@ static void F43_eps_below_at_and_above_every_stored_error(void **state) {
     }
 }
 
-/* F44, block order. Whatever order an index lists its blocks in, the patch is the same to the order of its rows. Jobs and
- * sources: test_import_faults, test_import. */
+/* F44, block order. Whatever order an index lists its blocks in, the patch is the same to the order of its rows.
+ * Jobs and sources: test_import_faults, test_import. */
 static void F44_blocks_in_any_order_give_the_same_rows(void **state) {
     (void)state;
     random_begin("F44");

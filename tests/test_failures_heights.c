@@ -1,7 +1,8 @@
 /* test_failures_heights.c - F1 to F9, F11 and F15: surfaces and tolerances on which published errors do not bound.
  *
- * Each test is a case of the catalogue: rasters made for it, meshes of rqt at eps on both sides of what decides, and
- * the independent verifier's word on them. What other methods give on the same rasters: examples/STABILITY.md. */
+ * Each test is a case of the catalogue: rasters made for it, meshes of rqt at eps on both sides of what decides,
+ * and the independent verifier's word on them. What other methods give on the same rasters: examples/STABILITY.md.
+ */
 #include "test_failures_support.h"
 
 /* F1. Whatever the extent and the blocks: two triangles, without an error. */
@@ -15,8 +16,7 @@ static void F1_constants_and_planes_are_two_triangles_at_eps_0(void **state) {
             rqt_lattice l;
             assert_int_equal(rqt_lattice_init(&l, r.width, r.height), RQT_OK);
             for (int k = smallest_k(&l); k <= largest_k(&l); k++) {
-                terrain t =
-                    terrain_create(raster_from_memory(r.width, r.height, r.q, NULL, &r.unit, r.name), k);
+                terrain t = terrain_create(raster_from_memory(r.width, r.height, r.q, NULL, &r.unit, r.name), k);
                 rqt_patch patch = terrain_ask(&t, 0, RQT_OUTLINE_EXACT, NULL);
                 const verify_report v = prove(&r, &patch);
                 CHECK(patch.triangle_count == 2 && patch.vertex_count == 4, "%s %dx%d: %zu triangles", r.name,
@@ -87,8 +87,8 @@ static void check_spike(int x, int y, int side, int height) {
  * equal to it the mesh is two triangles again. */
 static void F5_a_spike_is_kept_iff_it_is_higher_than_eps(void **state) {
     (void)state;
-    static const int places[][2] = {{0, 0},  {32, 32}, {32, 0}, {7, 0},   {0, 21},  {32, 5},  {16, 32}, {8, 8},
-                                    {16, 8}, {16, 16}, {24, 4}, {13, 19}, {1, 1},   {31, 30}, {9, 8},   {2, 12}};
+    static const int places[][2] = {{0, 0},  {32, 32}, {32, 0}, {7, 0},   {0, 21}, {32, 5},  {16, 32}, {8, 8},
+                                    {16, 8}, {16, 16}, {24, 4}, {13, 19}, {1, 1},  {31, 30}, {9, 8},   {2, 12}};
     for (size_t n = 0; n < sizeof places / sizeof *places; n++) {
         check_spike(places[n][0], places[n][1], 33, 40);
         check_spike(places[n][0], places[n][1], 33, -1);
@@ -114,12 +114,13 @@ static void F6_a_pit_of_one_sample_is_never_skipped(void **state) {
 /* F7. */
 static void F7_cliffs_of_any_direction_are_within_eps(void **state) {
     (void)state;
-    static const int lines[][3] = {{1, 0, 15}, {1, 0, 16}, {1, 0, 17}, {0, 1, 12},  {1, 1, 33},  {1, -1, 0},
+    static const int lines[][3] = {{1, 0, 15}, {1, 0, 16}, {1, 0, 17}, {0, 1, 12},  {1, 1, 33},   {1, -1, 0},
                                    {1, -1, 3}, {1, 2, 40}, {3, 1, 50}, {5, -7, 11}, {13, 1, 300}, {1, -17, -90}};
     const double eps[] = {0, 99, 100, 250, 499, 500};
     for (size_t n = 0; n < sizeof lines / sizeof *lines; n++)
-        check_raster(raster_of(relief_cliff, n % 2 ? 33 : 47, 33, lines[n][0], lines[n][1], lines[n][2], 500, "cliff"),
-                     eps, sizeof eps / sizeof *eps);
+        check_raster(
+            raster_of(relief_cliff, n % 2 ? 33 : 47, 33, lines[n][0], lines[n][1], lines[n][2], 500, "cliff"), eps,
+            sizeof eps / sizeof *eps);
 }
 
 /* The keys of the whole mesh. */
@@ -127,9 +128,9 @@ static key *mesh_of(terrain *t, double eps, rqt_select select, size_t *count) {
     const window all = window_all();
     rqt_region *region = region_of(&all, &t->m.grid.lattice);
     rqt_patch patch;
-    assert_int_equal(database_query(&t->d, region, rqt_code_eps(eps, 0), select, RQT_OUTLINE_EXACT,
-                                    &test_allocator, &patch),
-                     RQT_OK);
+    assert_int_equal(
+        database_query(&t->d, region, rqt_code_eps(eps, 0), select, RQT_OUTLINE_EXACT, &test_allocator, &patch),
+        RQT_OK);
     key *keys = keys_of_patch(&patch, t->m.r.width);
     *count = patch.triangle_count;
     rqt_patch_free(&patch);

@@ -1,5 +1,5 @@
-/* test_failures_support.h - the catalogue of inputs that break published methods, and what every mesh of rqt owes on
- * them.
+/* test_failures_support.h - the catalogue of inputs that break published methods, and what every mesh of rqt owes
+ * on them.
  *
  * Inputs F1 to F9 and F16 to F18, numbered as in the tests' names, as rasters of whole metres; a terrain is one of
  * them with its blocks, made by any metric, and is asked through the core's query as a store would ask. Whatever
@@ -27,8 +27,8 @@ static inline raster raster_of(relief *height, int width, int rows, int a, int b
 static inline int32_t relief_plane(int x, int y, const int p[4]) {
     return p[0] * x + p[1] * y + p[2];
 }
-/* F3: tents over tents, each half as wide as the one before and as high: b metres; a: the side of the largest, a power
- * of two that divides b. */
+/* F3: tents over tents, each half as wide as the one before and as high: b metres; a: the side of the largest, a
+ * power of two that divides b. */
 static inline int32_t relief_takagi(int x, int y, const int p[4]) {
     int32_t z = 0;
     for (int period = p[0]; period >= 2; period /= 2) {
@@ -54,7 +54,8 @@ static inline int32_t relief_cliff(int x, int y, const int p[4]) {
 static inline int32_t relief_saddle(int x, int y, const int p[4]) {
     return ((x ^ y) & 1) * p[0];
 }
-/* F9: a ridge of slope b along the secondary (a = 0) or the main diagonal (a = 1) of a square of side c, d: noise. */
+/* F9: a ridge of slope b along the secondary (a = 0) or the main diagonal (a = 1) of a square of side c, d: noise.
+ */
 static inline int32_t relief_ridge(int x, int y, const int p[4]) {
     return -abs(p[0] ? x - y : x + y - p[2]) * p[1] + (p[3] ? random_between(0, p[3]) : 0);
 }
@@ -92,8 +93,8 @@ static inline terrain terrain_create_as(raster r, int k, rqt_metric metric, rqt_
     model *m = &t.m;
     assert_int_equal(rqt_lattice_init(&m->grid.lattice, r.width, r.height), RQT_OK);
     if (metric == RQT_METRIC_EXACT) {
-        assert_int_equal(
-            rqt_errors_compute(&m->grid, &r.unit, &r.cost, &test_allocator, NULL, NULL, &m->saturated), RQT_OK);
+        assert_int_equal(rqt_errors_compute(&m->grid, &r.unit, &r.cost, &test_allocator, NULL, NULL, &m->saturated),
+                         RQT_OK);
         rqt_errors_saturate(&m->saturated);
     } else {
         assert_int_equal(rqt_metric_compute(&m->grid, &r.unit, &r.cost, metric, outline, &test_allocator, NULL,
@@ -119,9 +120,9 @@ static inline rqt_patch terrain_ask(terrain *t, double eps, rqt_outline outline,
     const window all = window_all();
     rqt_region *region = region_of(in ? in : &all, &t->m.grid.lattice);
     rqt_patch patch;
-    assert_int_equal(database_query(&t->d, region, rqt_code_eps(eps, 0), RQT_SELECT_THRESHOLD, outline,
-                                    &test_allocator, &patch),
-                     RQT_OK);
+    assert_int_equal(
+        database_query(&t->d, region, rqt_code_eps(eps, 0), RQT_SELECT_THRESHOLD, outline, &test_allocator, &patch),
+        RQT_OK);
     rqt_region_free(region);
     return patch;
 }
@@ -161,8 +162,8 @@ static inline bool is_in_a_half(void *context, int32_t col, int32_t row) {
         for (int x = col - 1; x <= col; x++)
             for (int half = 0; half < 2 && x >= 0 && y >= 0 && x + 1 < r->width && y + 1 < r->height; half++)
                 for (int c = 0; c < 3; c++)
-                    if (x + corner[(x ^ y) & 1][half][c][0] == col &&
-                        y + corner[(x ^ y) & 1][half][c][1] == row && half_is_valid(r, x, y, half))
+                    if (x + corner[(x ^ y) & 1][half][c][0] == col && y + corner[(x ^ y) & 1][half][c][1] == row &&
+                        half_is_valid(r, x, y, half))
                         return true;
     return false;
 }
@@ -194,8 +195,8 @@ static inline verify_report prove(const raster *r, const rqt_patch *p) {
     return report;
 }
 
-/* The three promises of a whole mesh with the outline `exact`: within eps, one piece, all of what is to be covered and
- * nothing else. Returns the number of its vertices. */
+/* The three promises of a whole mesh with the outline `exact`: within eps, one piece, all of what is to be covered
+ * and nothing else. Returns the number of its vertices. */
 static inline size_t check_mesh(terrain *t, double eps) {
     const raster *r = &t->m.r;
     rqt_patch patch = terrain_ask(t, eps, RQT_OUTLINE_EXACT, NULL);
@@ -222,12 +223,11 @@ static inline void check_raster(raster r, const double *eps, size_t count) {
     assert_int_equal(rqt_lattice_init(&l, r.width, r.height), RQT_OK);
     assert_true(count <= 16);
     for (int k = smallest_k(&l); k <= largest_k(&l); k += 2) {
-        terrain t = terrain_create(
-            raster_from_memory(r.width, r.height, r.q, r.valid, &r.unit, r.name), k);
+        terrain t = terrain_create(raster_from_memory(r.width, r.height, r.q, r.valid, &r.unit, r.name), k);
         for (size_t e = 0; e < count; e++) {
             const size_t seen = check_mesh(&t, eps[e]);
-            CHECK(k == smallest_k(&l) || seen == vertices[e], "%s, eps %g: %zu vertices in blocks of k %d, else %zu",
-                  r.name, eps[e], seen, k, vertices[e]);
+            CHECK(k == smallest_k(&l) || seen == vertices[e],
+                  "%s, eps %g: %zu vertices in blocks of k %d, else %zu", r.name, eps[e], seen, k, vertices[e]);
             vertices[e] = seen;
         }
         terrain_free(&t);

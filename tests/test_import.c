@@ -217,7 +217,7 @@ static void a_quantum_in_feet_is_a_step_in_feet(void **unused) {
     close_terrain(&t);
 }
 
-static void heights_far_from_zero_lose_nothing(void **unused) {
+static void F10_millimetres_far_from_zero_are_not_lost(void **unused) {
     (void)unused;
     double near[40 * 40], far[40 * 40];
     fill(near, 40, 40, 0.001);
@@ -433,7 +433,7 @@ static void cut(const double *from, int width, int x, int y, int w, int h, doubl
     for (int r = 0; r < h; r++) memcpy(to + r * w, from + (y + r) * width + x, (size_t)w * sizeof *to);
 }
 
-static void tiles_that_share_a_row_equal_one_raster(void **unused) {
+static void F44_tiles_in_either_order_equal_one_raster(void **unused) {
     (void)unused;
     enum { W = 33, H = 41 };
     double values[W * H], part[W * H];
@@ -580,14 +580,14 @@ int main(void) {
         TEST(decimals_are_kept_exactly),
         TEST(noise_is_rounded_and_says_so),
         TEST(a_quantum_in_feet_is_a_step_in_feet),
-        TEST(heights_far_from_zero_lose_nothing),
+        TEST(F10_millimetres_far_from_zero_are_not_lost),
         TEST(metres_follow_unit_scale_and_offset),
         TEST(an_unknown_unit_is_told_and_taken_as_metres),
         TEST(south_up_and_mirrored_rasters_equal_north_up),
         TEST(pixels_that_are_points_lie_where_they_say),
         TEST(without_a_geotransform_samples_are_columns_and_rows),
         TEST(the_crs_is_told),
-        TEST(tiles_that_share_a_row_equal_one_raster),
+        TEST(F44_tiles_in_either_order_equal_one_raster),
         TEST(the_later_source_wins_and_a_void_never_does),
         TEST(sources_of_unlike_kinds_meet_in_metres),
         TEST(names_come_from_the_first_file),
