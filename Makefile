@@ -103,6 +103,12 @@ $(BUILD)/tests/test_%.o: tests/test_%.c $(GENERATED)
 $(BUILD)/tests/test_%: $(BUILD)/tests/test_%.o $(BUILD)/tests/libtest.a
 	@$(CXX) $(SANITIZE) -o $@ $^ $(LIBS_TEST)
 
+$(BUILD)/tests/stability.o: tests/bench/stability.c
+	@mkdir -p $(@D)
+	@echo "  compile $<"; $(CC) $(CFLAGS) $(INCLUDES) -Itests -c $< -o $@
+$(BUILD)/tests/stability: $(BUILD)/tests/stability.o $(BUILD)/tests/libtest.a
+	@$(CXX) $(SANITIZE) -o $@ $^ $(LIBS_TEST)
+
 .PHONY: test-programs test test-quick test-sanitize
 test-programs: $(TEST_PROGRAMS)
 	@:

@@ -59,9 +59,10 @@ static inline int32_t relief_saddle(int x, int y, const int p[4]) {
 static inline int32_t relief_ridge(int x, int y, const int p[4]) {
     return -abs(p[0] ? x - y : x + y - p[2]) * p[1] + (p[3] ? random_between(0, p[3]) : 0);
 }
-/* F16 to F18: ground for voids: hills of a metres. */
+/* F16 to F18: ground for voids: hills of a metres, shifted by (b,c). */
 static inline int32_t relief_hills(int x, int y, const int p[4]) {
-    return p[0] * (takagi(x, y, 32) + takagi(x + 5, y + 11, 8) * 2) / 16 + random_between(0, 3);
+    const int u = x + p[1], v = y + p[2];
+    return p[0] * (takagi(u, v, 32) + takagi(u + 5, v + 11, 8) * 2) / 16 + random_between(0, 3);
 }
 
 static inline void raster_void(raster *r, int x, int y) {
