@@ -50,9 +50,9 @@ static inline int32_t relief_spike(int x, int y, const int p[4]) {
 static inline int32_t relief_cliff(int x, int y, const int p[4]) {
     return p[0] * x + p[1] * y > p[2] ? p[3] : 0;
 }
-/* F8: each cell a saddle of a metres: the two diagonals of every cell fit equally ill. */
+/* F8: each cell a saddle of a metres, from column b on of c: the two diagonals of every cell fit equally ill. */
 static inline int32_t relief_saddle(int x, int y, const int p[4]) {
-    return ((x ^ y) & 1) * p[0];
+    return ((x ^ y) & 1) * (x < p[1] ? p[0] : p[2]);
 }
 /* F9: a ridge of slope b along the secondary (a = 0) or the main diagonal (a = 1) of a square of side c, d: noise.
  */
