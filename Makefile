@@ -156,14 +156,16 @@ check-format: ## fail when a source is not laid out
 .PHONY: docs check-docs
 docs: products ## write ext/SQL.md from the function table
 	@./tests/sql_reference.sh $(BUILD) > ext/SQL.md
-check-docs: ## fail when ext/SQL.md or the README's session are not what the program says
+check-docs: ## fail when ext/SQL.md, the README's session or the page on stability are not what the program says
 	@./src/install-packages.sh build test
-	@$(MAKE) --no-print-directory -j2 products
+	@$(MAKE) --no-print-directory -j2 products $(BUILD)/tests/stability
 	@./tests/sql_reference.sh $(BUILD) | diff -u ext/SQL.md - && echo "ext/SQL.md is what the function table says"
 	@BUILD=$(BUILD) ./tests/check_readme.sh
+	@BUILD=$(BUILD) ./tests/bench/stability.sh | diff -u examples/STABILITY.md - && echo "examples/STABILITY.md is what make stability prints"
+	@./tests/check_catalogue.sh
 
 # ---------------------------------------------------------------------------------------------------- benches
-.PHONY: bench bench-data bench-table1 chart peers
+.PHONY: bench bench-data bench-table1 chart peers stability
 bench: ## speed and size beside GDAL's, medians of five and more
 	@./src/install-packages.sh build test
 	@$(MAKE) --no-print-directory -j2 products
@@ -176,6 +178,12 @@ bench-table1: ## share of vertices over eps beside the paper's table 1
 	@./src/install-packages.sh build test
 	@$(MAKE) --no-print-directory -j2 products
 	@BUILD=$(BUILD) ./tests/bench/bench_table1.sh
+
+stability: ## examples/STABILITY.md: what breaks published methods, what they give, what rqt gives
+	@./src/install-packages.sh build test
+	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/stability
+	@BUILD=$(BUILD) ./tests/bench/stability.sh examples/charts/stability.png > $(BUILD)/STABILITY.md
+	@mv $(BUILD)/STABILITY.md examples/STABILITY.md && echo "examples/STABILITY.md and its picture are written"
 
 chart: ## speed against accuracy, drawn: pictures in build/chart; peers from npm where there is one; DATA=dir
 	@./src/install-packages.sh build test

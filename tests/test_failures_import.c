@@ -114,7 +114,9 @@ static bool same_patch(const rqt_patch *a, const rqt_patch *b) {
     if (a->triangle_count != b->triangle_count || a->vertex_count != b->vertex_count) return false;
     for (size_t v = 0; v < a->vertex_count; v++)
         if (a->vertices[v].col != b->vertices[v].col || a->vertices[v].row != b->vertices[v].row) return false;
-    return !memcmp(a->triangles, b->triangles, 3 * a->triangle_count * sizeof *a->triangles);
+    for (size_t i = 0; i < 3 * a->triangle_count; i++)
+        if (a->triangles[i] != b->triangles[i]) return false;
+    return true;
 }
 
 /* F41. Windows that end on, just before and just after the borders of blocks find the same blocks at northings of
