@@ -4,6 +4,12 @@ SELECT count(*) FROM rqt_triangles(NULL, 1, NULL, '{}');
 --> 4
 SELECT count(*) FROM rqt_triangles(NULL, 1, NULL, ' { "mode" : "cover" } ');
 --> 4
+SELECT count(*) FROM rqt_triangles(NULL, 1, NULL, '{"mode":"border"}');
+--> 4
+SELECT count(*) FROM rqt_triangles(NULL, 9, NULL, '{"detail":[]}');
+--> 2
+SELECT count(*) FROM rqt_triangles(NULL, 9, NULL, '{"detail":[["POINT(0 0)", 1]]}');
+--> 4
 SELECT count(*) FROM rqt_triangles(NULL, 1, NULL, '{"outline":"exact"}');
 --> 4
 SELECT count(*) FROM rqt_triangles(NULL, 1, NULL, '{"metric":"exact"}');
@@ -62,14 +68,10 @@ SELECT * FROM rqt_range(NULL, 1, NULL, '{"max_vertices":"5"}');
 -- of the contract, not yet here
 SELECT * FROM rqt_range(NULL, 1, NULL, '{"mode":"snap"}');
 --! rqt_range(): option "mode":"snap" is not in this version
-SELECT * FROM rqt_strip(NULL, 1, NULL, '{"mode":"border"}');
---! rqt_strip(): option "mode":"border" is not in this version
 SELECT * FROM rqt_verify(NULL, 1, NULL, '{"mode":"cut"}');
 --! rqt_verify(): option "mode":"cut" is not in this version
 SELECT rqt_mesh(NULL, 1, 'obj', NULL, '{"outline":"tol"}');
 --! rqt_mesh(): option "outline":"tol" is not in this version
-SELECT rqt_mesh(NULL, 1, 'obj', NULL, '{"detail":5}');
---! rqt_mesh(): option "detail" is not in this version
 SELECT * FROM rqt_triangles(NULL, 1, NULL, '{"max_triangles":100}');
 --! rqt_triangles(): option "max_triangles" is not in this version
 SELECT * FROM rqt_range(NULL, 1, NULL, '{"previous":"x"}');
