@@ -13,8 +13,8 @@ typedef struct choice {
 } choice;
 
 static const choice choices[] = {
-    {"mode", " cover ", " snap border cut "},
-    {"outline", " exact ", " tol "},
+    {"mode", " cover snap cut ", " border "},
+    {"outline", " exact tol ", ""},
     {"metric", " exact minimal local wedgie euclid ", ""},
     {"select", " threshold topdown bottomup ", ""},
     {"strip", " bintree fan ", ""},
@@ -42,6 +42,13 @@ static int index_of(const choice *c, const char *value) {
     return n;
 }
 
+static request_mode mode_of(const char *value) {
+    static const char *const modes[] = {"cover", "snap", "border", "cut"}; /* as request_mode */
+    int n = 0;
+    while (strcmp(modes[n], value) != 0) n++;
+    return (request_mode)n;
+}
+
 static int read_one(const cJSON *item, request *r, char **error) {
     const choice *c = NULL;
     for (size_t i = 0; i < sizeof choices / sizeof *choices; i++)
@@ -62,7 +69,9 @@ static int read_one(const cJSON *item, request *r, char **error) {
     if (!holds(c->done, value))
         return fail(error, "option \"%s\" has no value \"%s\"; this version knows%.*s", c->key, value,
                     (int)strlen(c->done) - 1, c->done);
-    /* The lists above are in the order of the enumerations. */
+    if (strcmp(c->key, "mode") == 0) r->mode = mode_of(value);
+    /* The lists of these are in the order of the enumerations. */
+    if (strcmp(c->key, "outline") == 0) r->options.outline = (rqt_outline)index_of(c, value);
     if (strcmp(c->key, "select") == 0) r->options.select = (rqt_select)index_of(c, value);
     if (strcmp(c->key, "metric") == 0) r->options.metric = (rqt_metric)index_of(c, value);
     if (strcmp(c->key, "strip") == 0) r->fans = strcmp(value, "fan") == 0;
