@@ -73,7 +73,7 @@ static int run_transform(sqlite3 *db, sqlite3_stmt *row, const char *what, int32
 static int transform(sqlite3 *db, const store_terrain *t, const char *what, rqt_geometry **geometry, char **error) {
     const int32_t srid = rqt_geometry_srid(*geometry);
     if (!*t->crs && t->srid <= 0)
-        return fail(error, "%s has SRID %d, and terrain %s has no coordinate system to transform it to", what, srid,
+        return fail(error, "%s has SRID %d, terrain %s has no coordinate system to transform it to", what, srid,
                     t->name);
     sqlite3_stmt *row = NULL;
     int code = sqlite3_prepare_v2(db, "SELECT ST_Transform(GeomFromWKB(?1, ?2), ?3, NULL, ?4, ?5)", -1, &row, NULL);
