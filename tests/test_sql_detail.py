@@ -142,6 +142,9 @@ thin = proof(db, box(30.3, -50, 30.4, -20), 1e6, mode="border")
 equal("F24 a rectangle thinner than a cell is grown to one", thin[7], half_cells(lambda x, y: 30 < x < 31 and 20 < y < 50))
 both = proof(db, box(13, -61, 57, -17), EPS, mode="border", detail=listed)
 check("border and detail go together", both[0] <= EPS and both[1:4] == (0, 0, 0) and both[7] == half_cells(lambda x, y: 13 < x < 57 and 17 < y < 61), both)
+for given in ({"mode": "cut"}, {"mode": "snap"}, {"outline": "tol"}, {"mode": "border", "outline": "tol"}, {"mode": "cut", "outline": "tol"}):
+    row = proof(db, "POLYGON((13.25 -61, 57 -60.5, 40.5 -17, 13.25 -61))", EPS, detail=listed, **given)
+    check("detail keeps eps with %s" % given, 0 < row[0] <= EPS and row[1:4] == (0, 0, 0) and row[4] > 100, row)
 for metric in ("exact", "wedgie"):
     row = proof(db, box(13, -61, 57, -17), EPS, mode="border", metric=metric, detail=listed)
     check("so they do with metric %s" % metric, row[0] <= EPS and row[1:4] == (0, 0, 0), row)

@@ -454,6 +454,11 @@ rqt_status rqt_geometry_parse(const void *bytes, size_t n, bool text, const rqt_
 void rqt_geometry_free(rqt_geometry *geometry);
 /* 0 when the geometry names none (GeoPackage's 0 and -1 count as none). */
 int32_t rqt_geometry_srid(const rqt_geometry *geometry);
+bool rqt_geometry_is_empty(const rqt_geometry *geometry);
+/* As well-known binary, x and y only: one member as what it is, several as a collection. *bytes is released with
+ * allocator->resize(context, bytes, 0). */
+rqt_status rqt_geometry_wkb(const rqt_geometry *geometry, const rqt_allocator *allocator, uint8_t **bytes,
+                            size_t *size);
 
 /* Where the samples of a terrain lie: sample (col,row) is at (x0 + col*dx, y0 + row*dy). dx, dy finite, not 0. */
 typedef struct rqt_placement {
@@ -484,6 +489,14 @@ void rqt_region_grow_rectangle(rqt_region *region);
  * member with an area: interior meets interior. For lines and points, and polygons that the rounding collapsed:
  * the closed triangle meets it. Exact. */
 bool rqt_region_meets(const rqt_region *region, rqt_vertex a, rqt_vertex b, rqt_vertex c);
+/* Mode `snap`: the union of all squares of a grid that the region meets, clipped to the raster: a square belongs
+ * when its interior meets the interior of a member with an area, or when a line or point touches it. The grid is
+ * anchored at sample (0,0); its side is the largest power of two of samples that is not above an eighth of the
+ * longer side of the region's box (rqt_region_box), at least 1: so no region has more than 18 squares a side.
+ * Everything stays everything. */
+rqt_status rqt_region_snap(const rqt_region *region, const rqt_lattice *lattice, const rqt_allocator *allocator,
+                           rqt_region **snapped);
+int32_t rqt_region_snap_side(const rqt_region *region);
 /* Is the sample in the interior of a member with an area? */
 bool rqt_region_contains(const rqt_region *region, rqt_vertex sample);
 
@@ -629,6 +642,33 @@ typedef struct rqt_leaf_corner {
  * corners as the patch of the point has them, in its order. */
 rqt_found rqt_query_leaf_at(const rqt_query *query, const rqt_answer *answer, const rqt_block *block, int64_t x,
                             int64_t y, rqt_leaf_corner leaf[3]);
+
+/* ----------------------------------------------------------------------------------------------- cut --
+ * Mode `cut`: the patch clipped to the region. Its triangles tile what the region and the leaves of the patch have
+ * in common; they have an area, turn counter-clockwise and share whole edges. Vertices on the region's border are
+ * samples no longer, but places between samples, with heights on the leaf's plane: in quanta, not whole ones. */
+typedef struct rqt_cut_vertex {
+    double col, row; /* multiples of 2^(lattice.K - 52) sample: exact */
+    double q;
+    rqt_code error; /* as in the patch; 0 where the vertex is no sample of it: the mesh needs it for no height */
+    int16_t level;  /* as in the patch; -1 there */
+} rqt_cut_vertex;
+
+typedef struct rqt_cut {
+    rqt_cut_vertex *vertices; /* each once, in the order of the triangles */
+    size_t vertex_count;
+    uint32_t *triangles; /* as in rqt_patch */
+    size_t triangle_count;
+    rqt_allocator allocator;
+    size_t vertex_capacity, triangle_capacity;
+} rqt_cut;
+
+/* patch: what a query has made of region, with triangles. Of members without an area (lines, points), whole leaves
+ * stay. is_interrupted may be NULL. RQT_INTERRUPTED, RQT_NO_MEMORY: cut is empty. */
+rqt_status rqt_cut_make(const rqt_patch *patch, const rqt_region *region, const rqt_lattice *lattice,
+                        const rqt_allocator *allocator, bool (*is_interrupted)(void *context), void *context,
+                        rqt_cut *cut);
+void rqt_cut_free(rqt_cut *cut);
 
 /* One generalized strip of a patch: n indices; triangle i is (s[i], s[i+1], s[i+2]), its last two swapped for odd
  * i, counter-clockwise; a triangle with two equal vertices is a join. An empty patch gives n = 0.
