@@ -396,8 +396,9 @@ static bool polygon_touches(const rqt_region *region, const region_polygon *poly
     region_search_begin(&s, region->nodes + polygon->tree, polygon->count, box);
     for (size_t i; region_search_next(&s, &i);)
         if (region_box_is_touched(box, &region->border.items[polygon->first + i])) return true;
-    return is_inside(region, polygon,
-                     (region_point){box->x0, box->y0}); /* no border in it: all of it, or nothing */
+    const region_point any = {box->x0,
+                              box->y0}; /* there is no border in the box: all of it is inside, or nothing */
+    return is_inside(region, polygon, any);
 }
 
 bool region_touches(const rqt_region *region, const region_box *box) {
