@@ -666,7 +666,7 @@ static void F27_border_on_odd_coordinates_has_the_regions_area(void **state) {
         trial *t = trial_over(raster_make(n % 3 ? SURFACE_HILLS : SURFACE_CONSTANT, width, height, -1),
                               n % 2 ? 1e6 : 3); /* coarse all around */
         const int x0 = random_between(0, 4) * 2 + 1, y0 = random_between(0, 4) * 2 + 1,
-                  x1 = x0 + random_between(1, width), y1 = y0 + random_between(1, height);
+                  x1 = x0 + random_between(2, width), y1 = y0 + random_between(2, height);
         const int off = n % 4 == 3; /* between samples: grown outward */
         give_border(t, NULL, 4 * x0 + off, 4 * y0 + 2 * off, 4 * x1 - off, 4 * y1 - 3 * off);
         const int right = x1 < width - 1 ? x1 : width - 1, bottom = y1 < height - 1 ? y1 : height - 1;
