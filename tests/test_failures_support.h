@@ -135,12 +135,14 @@ static inline bool patch_has(const rqt_patch *p, int col, int row) {
 }
 
 /* ------------------------------------------------------------------------------------------- proof -- */
-/* The finest triangles of cell (x,y): its diagonal is the main one where x and y are of equal parity. */
+/* The finest triangles of cell (x,y): corners of the two halves, for x and y of equal parity, whose diagonal is the
+ * main one, and of different parity. */
+static const int half_corner[2][2][3][2] = {{{{0, 0}, {0, 1}, {1, 1}}, {{0, 0}, {1, 1}, {1, 0}}},
+                                            {{{0, 0}, {0, 1}, {1, 0}}, {{1, 0}, {0, 1}, {1, 1}}}};
+
 static inline bool half_is_valid(const raster *r, int x, int y, int half) {
-    static const int corner[2][2][3][2] = {{{{0, 0}, {0, 1}, {1, 1}}, {{0, 0}, {1, 1}, {1, 0}}},
-                                           {{{0, 0}, {0, 1}, {1, 0}}, {{1, 0}, {0, 1}, {1, 1}}}};
     for (int c = 0; c < 3 && r->valid; c++) {
-        const int *at = corner[(x ^ y) & 1][half][c];
+        const int *at = half_corner[(x ^ y) & 1][half][c];
         if (!r->valid[(y + at[1]) * r->width + x + at[0]]) return false;
     }
     return true;
@@ -156,16 +158,15 @@ static inline uint64_t halves_of(const raster *r) {
 
 /* What the outline `exact` promises to cover: corners of half-cells with three valid corners. */
 static inline bool is_in_a_half(void *context, int32_t col, int32_t row) {
-    static const int corner[2][2][3][2] = {{{{0, 0}, {0, 1}, {1, 1}}, {{0, 0}, {1, 1}, {1, 0}}},
-                                           {{{0, 0}, {0, 1}, {1, 0}}, {{1, 0}, {0, 1}, {1, 1}}}};
     const raster *r = context;
-    for (int y = row - 1; y <= row; y++)
-        for (int x = col - 1; x <= col; x++)
-            for (int half = 0; half < 2 && x >= 0 && y >= 0 && x + 1 < r->width && y + 1 < r->height; half++)
-                for (int c = 0; c < 3; c++)
-                    if (x + corner[(x ^ y) & 1][half][c][0] == col && y + corner[(x ^ y) & 1][half][c][1] == row &&
-                        half_is_valid(r, x, y, half))
-                        return true;
+    for (int n = 0; n < 8; n++) { /* the halves of the four cells that have the sample for a corner */
+        const int x = col - (n & 1), y = row - (n >> 1 & 1), half = n >> 2;
+        if (x < 0 || y < 0 || x + 1 >= r->width || y + 1 >= r->height || !half_is_valid(r, x, y, half)) continue;
+        for (int c = 0; c < 3; c++) {
+            const int *at = half_corner[(x ^ y) & 1][half][c];
+            if (x + at[0] == col && y + at[1] == row) return true;
+        }
+    }
     return false;
 }
 
