@@ -67,6 +67,12 @@ MUTANTS = [
     ("border: lines have one", "src/core/region.c",
      "return region_triangle_init(&t, a, b, c) && polygons_meet(region, &t);", "return rqt_region_meets(region, a, b, c) && region_triangle_init(&t, a, b, c);",
      "test_core_rule", "borders_force_what_is_mixed_and_no_more"),
+    ("border: F24 a rectangle thinner than a cell vanishes", "src/core/region.c",
+     "    box->x0 = floor_sample(box->x0) * REGION_UNIT;\n", "    box->x0 = -floor_sample(-box->x0) * REGION_UNIT;\n",
+     "test_core_rule", "F24_regions_thinner_than_a_cell_have_a_border_or_are_covered"),
+    ("border: F26 holes count as inside", "src/core/region.c",
+     "if (is_right != left) odd = !odd;", "if (is_right != left) odd = true;",
+     "test_core_rule", "F26_polygons_with_holes_touching_themselves_or_covered"),
     # the store
     ("rules: blocks that answer eps answer the rule", "src/store/query.c",
      "if (code == SQLITE_OK && options->rule)", "if (false)", "test_sql_detail.py", "a mesh with detail keeps eps, without a crack"),
