@@ -602,6 +602,66 @@ static void neighbours_share_the_vertices_of_their_border(void **state) {
     }
 }
 
+/* The largest lattice, whose root's diagonal is oblique where the raster ends; and regions whose corners are as far
+ * away as corners may be. */
+static void the_largest_terrains_and_regions(void **state) {
+    (void)state;
+    random_begin(__func__);
+    int meeting = 0;
+    for (int n = 0; n < 60; n++) {
+        const bool far = n % 2;
+        const int32_t w = far ? 17 : (1 << 20) + 1 - random_between(0, 1000),
+                      h = far ? 11 : random_between(300000, 1 << 20);
+        rqt_lattice lattice;
+        assert_int_equal(rqt_lattice_init(&lattice, w, h), RQT_OK);
+        rqt_patch_vertex v[4];
+        for (int i = 0; i < 4; i++)
+            v[i] = (rqt_patch_vertex){
+                .col = i & 1 ? w - 1 : 0, .row = i & 2 ? h - 1 : 0, .q = random_between(-1000000, 1000000)};
+        static const uint32_t root[6] = {0, 3, 1, 0, 2, 3};
+        uint32_t triangle[6];
+        static shape s;
+        memset(&s, 0, sizeof s);
+        s.members = s.rings[0] = 1;
+        s.spots[0][0] = random_between(3, 12);
+        for (int i = 0; i < s.spots[0][0]; i++) {
+            const int64_t reach = far ? (int64_t)1 << 59 : (int64_t)h * ORACLE_UNITS;
+            s.x[0][0][i] = (int64_t)(random_bits() % (uint64_t)(2 * reach)) - (far ? reach : reach / 2);
+            s.y[0][0][i] = (int64_t)(random_bits() % (uint64_t)(2 * reach)) - (far ? reach : reach / 2);
+            if (far) { /* what the text says is what doubles hold */
+                s.x[0][0][i] &= ~INT64_C(0xFFFF);
+                s.y[0][0][i] &= ~INT64_C(0xFFFF);
+            }
+        }
+        shape_say(&s);
+        rqt_region *region = region_of_shape(s.text, &lattice);
+        rqt_patch patch = {.vertices = v, .vertex_count = 4, .triangles = triangle};
+        for (int t = 0; t < 2; t++) { /* as a query would */
+            rqt_vertex at[3];
+            uint32_t *to = triangle + 3 * patch.triangle_count;
+            for (int k = 0; k < 3; k++) at[k] = (rqt_vertex){v[root[3 * t + k]].col, v[root[3 * t + k]].row};
+            if (!rqt_region_meets(region, at[0], at[1], at[2])) continue;
+            memcpy(to, root + 3 * (size_t)t, 3 * sizeof *to);
+            patch.triangle_count++;
+        }
+        meeting += patch.triangle_count > 0;
+        rqt_cut cut;
+        assert_int_equal(rqt_cut_make(&patch, region, &lattice, &test_allocator, NULL, NULL, &cut), RQT_OK);
+        long double wanted = 0;
+        for (int t = 0; t < 2; t++) {
+            oracle_point leaf[3];
+            for (int k = 0; k < 3; k++) leaf[k] = (oracle_point){v[root[3 * t + k]].col, v[root[3 * t + k]].row};
+            wanted += common_area(leaf, &s);
+        }
+        const long double area = check_mesh(&cut, lattice.K, "large");
+        CHECK(fabsl(area - wanted) <= (far ? 1e-5L : 1e-9L * w * h), "%s: area %.18Lg, should be %.18Lg", s.text,
+              area, wanted);
+        rqt_cut_free(&cut);
+        rqt_region_free(region);
+    }
+    CHECK(meeting > 20, "%d regions met the terrain", meeting);
+}
+
 static int looks;
 static bool stops(void *context) {
     return ++looks >= *(const int *)context;
@@ -665,6 +725,7 @@ int main(void) {
         TEST(a_segment_passes_below_a_hanging_edge),
         TEST(faces_tile_the_leaf_whatever_rounding_does),
         TEST(neighbours_share_the_vertices_of_their_border),
+        TEST(the_largest_terrains_and_regions),
         TEST(F48_no_memory_and_interrupt_leave_nothing),
         TEST(F26_polygons_of_all_kinds_are_cut_to_their_area),
     };
