@@ -252,6 +252,19 @@ ok "gpkg of nothing is an empty layer" $? "$(cat err)"
 rqt $M --eps 2 --mode cover -o x.obj; cp x.obj first.obj; echo old >x.obj
 rqt $M --eps 2 -o x.obj; cmp -s x.obj first.obj; ok "mesh replaces a file, and gives the same bytes again" $?
 rqt $M --eps 2 -o X.OBJ; [ $status = 0 ] && cmp -s X.OBJ first.obj; ok "mesh: endings in capitals" $?
+triangle='POLYGON((1203.5 2204,1390 2211.5,1290.25 2399,1203.5 2204))'
+want=$(sql t.gpkg "SELECT count(*) FROM rqt_triangles('$triangle', 2, 'hill', '{\"mode\":\"cut\",\"outline\":\"tol\"}')")
+for kind in obj ply gpkg svg png; do
+    rqt $M --eps 2 --region "$triangle" --mode cut --outline tol -o cut.$kind
+    case $kind in
+        obj) got=$(grep -c '^f ' cut.obj) ;;
+        ply) got=$(sed -n 's/^element face //p' <(head -c 600 cut.ply | tr -d '\0')) ;;
+        gpkg) got=$(sqlite3 cut.gpkg 'SELECT count(*) FROM hill') ;;
+        *) got=$want ;;
+    esac
+    [ $status = 0 ] && [ -s cut.$kind ] && [ "$got" = "$want" ] && [ "$want" -gt 20 ]
+    ok "mesh: mode cut as .$kind" $? "$got, not $want; $(cat err)"
+done
 if command -v gdal_translate >/dev/null; then
     gdal_translate -q -a_srs EPSG:32633 hill.asc utm.tif 2>/dev/null
     rqt import utm.tif utm.gpkg
