@@ -191,6 +191,12 @@ prints "verify: a box, given in any order" "holds" verify t.gpkg --terrain hill 
 cp out box; rqt verify t.gpkg --terrain hill --eps 2 --region 'POLYGON((1200 2200,1400 2200,1400 2400,1200 2400,1200 2200))'
 cmp -s out box; ok "... is the same as its WKT" $?
 prints "verify: a region outside is empty" "empty" verify t.gpkg --terrain hill --eps 2 --region 0,0,1,1
+prints "verify: mode cut" "holds" verify t.gpkg --terrain hill --eps 0,2 --region 'POLYGON((1201.5 2200,1400 2210.25,1333 2400,1201.5 2200))' --mode cut
+prints "verify: mode border" "holds" verify t.gpkg --terrain hill --eps 0,2,1000 --region 'POLYGON((1201.5 2200,1400 2210.25,1333 2400,1201.5 2200))' --mode border
+prints "verify: mode snap" "holds" verify t.gpkg --terrain hill --eps 2 --region 1201,2203,1400,2400 --mode snap
+prints "verify: outline tol" "holds" verify t.gpkg --terrain my.hole-2 --eps 0,3,1000 --outline tol
+refuses "verify: an unknown mode" 2 "there is no such mode; there are" verify t.gpkg --eps 1 --mode x
+refuses "verify: an unknown outline" 2 "there is no such outline" verify t.gpkg --eps 1 --outline x
 prints "verify: rounded heights" "holds" verify u.gpkg --terrain feet --eps 0,1
 
 # ------------------------------------------------------------------------------------------------------------ mesh
@@ -200,7 +206,7 @@ refuses "mesh: no output" 2 "-o is missing" $M --eps 1
 refuses "mesh: .glb is for later" 2 ".glb is not in this version" $M --eps 1 -o a.glb
 refuses "mesh: an unknown ending" 2 "the file ends in" $M --eps 1 -o a.xyz
 refuses "mesh: no ending" 2 "the file ends in" $M --eps 1 -o .obj
-refuses "mesh: --mode cut is for later" 2 "--mode cut is not in this version" $M --eps 1 --mode cut -o a.obj
+refuses "mesh: an unknown outline" 2 "there is no such outline; there are exact and tol" $M --eps 1 --outline x -o a.obj
 refuses "mesh: an unknown mode" 2 "there is no such mode" $M --eps 1 --mode x -o a.obj
 refuses "mesh: a list of eps for a model" 2 "--eps takes one number" $M --eps 1,2 -o a.obj
 refuses "mesh: too narrow" 2 "--width 100" $M --eps 1 --width 100 -o a.png
@@ -246,6 +252,19 @@ ok "gpkg of nothing is an empty layer" $? "$(cat err)"
 rqt $M --eps 2 --mode cover -o x.obj; cp x.obj first.obj; echo old >x.obj
 rqt $M --eps 2 -o x.obj; cmp -s x.obj first.obj; ok "mesh replaces a file, and gives the same bytes again" $?
 rqt $M --eps 2 -o X.OBJ; [ $status = 0 ] && cmp -s X.OBJ first.obj; ok "mesh: endings in capitals" $?
+triangle='POLYGON((1203.5 2204,1390 2211.5,1290.25 2399,1203.5 2204))'
+want=$(sql t.gpkg "SELECT count(*) FROM rqt_triangles('$triangle', 2, 'hill', '{\"mode\":\"cut\",\"outline\":\"tol\"}')")
+for kind in obj ply gpkg svg png; do
+    rqt $M --eps 2 --region "$triangle" --mode cut --outline tol -o cut.$kind
+    case $kind in
+        obj) got=$(grep -c '^f ' cut.obj) ;;
+        ply) got=$(sed -n 's/^element face //p' <(head -c 600 cut.ply | tr -d '\0')) ;;
+        gpkg) got=$(sqlite3 cut.gpkg 'SELECT count(*) FROM hill') ;;
+        *) got=$want ;;
+    esac
+    [ $status = 0 ] && [ -s cut.$kind ] && [ "$got" = "$want" ] && [ "$want" -gt 20 ]
+    ok "mesh: mode cut as .$kind" $? "$got, not $want; $(cat err)"
+done
 if command -v gdal_translate >/dev/null; then
     gdal_translate -q -a_srs EPSG:32633 hill.asc utm.tif 2>/dev/null
     rqt import utm.tif utm.gpkg

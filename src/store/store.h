@@ -77,7 +77,10 @@ typedef struct store_query_options {
     rqt_outline outline;
     rqt_metric metric;   /* exact is what is stored; minimal may be; the others are computed, see methods.c */
     rqt_product product; /* what the patch holds */
-    bool wants_leaves;   /* fill patch->leaves; with RQT_PRODUCT_TRIANGLES only */
+    /* NULL, or what else selects: the store sets its eps. Only for metrics whose mesh stays right when vertices are
+     * added: exact, local, wedgie, euclid; minimal is SQLITE_ERROR. */
+    rqt_rule *rule;
+    bool wants_leaves; /* fill patch->leaves; with RQT_PRODUCT_TRIANGLES only */
 } store_query_options;
 
 /* One row per block that answered, in Morton order. */
@@ -105,6 +108,8 @@ int store_query(store *s, const store_terrain *t, const rqt_region *region, doub
 int store_query_within(store *s, const store_terrain *t, const rqt_region *region, double eps,
                        const store_query_options *options, int64_t max_vertices, double *achieved, rqt_patch *patch,
                        store_reads *reads, char **error);
+/* Was sqlite3_interrupt called? *code says how to end. */
+bool store_is_interrupted(store *s, int *code);
 /* Instead of rqt_patch_free: the store keeps the memory for its next query, up to a limit. */
 void store_keep(store *s, rqt_patch *patch);
 /* Memory that a metric which is not stored may take, heights included. */
