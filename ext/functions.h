@@ -87,6 +87,22 @@ void request_free(request *r);
 int request_terrain(store *s, sqlite3_value *name, const store_terrain **terrain, char **error);
 /* "what must be a number ...": false and a sentence when the value is none, or NaN. */
 bool request_number(sqlite3_value *value, const char *what, double *number, char **error);
+/* A geometry out of a value; *geometry is NULL for NULL. what: the argument's name. */
+int request_geometry(sqlite3_value *value, const char *what, rqt_geometry **geometry, char **error);
+/* The lines of a geometry (points are lines of one point), for functions that want a line: line i has counts[i]
+ * points of x,y, one line after the other. SQLITE_ERROR for NULL, an empty geometry and polygons. */
+typedef struct line_set {
+    double *xy;
+    size_t *counts;
+    size_t count, points;
+    int32_t srid;
+} line_set;
+int lines_read(sqlite3_value *value, line_set *lines, char **error);
+void lines_free(line_set *lines);
+/* Is it in the terrain's CRS? */
+int request_place(rqt_geometry *geometry, const char *what, const store_terrain *t, char **error);
+/* Longitudes are the same modulo 360: add the copies that meet the terrain, if it is in degrees. */
+int request_turn(rqt_geometry *geometry, const store_terrain *t);
 /* Options of the contract; sentences name what is unknown and what is not in this version. options.c */
 int options_read(const char *json, request *r, char **error);
 
@@ -96,8 +112,9 @@ int fail(char **error, const char *format, ...);
 /* The functions themselves, by file. */
 fill_rows fill_range, fill_triangles, fill_strip;                          /* mesh_tables.c */
 fill_rows fill_terrains, fill_explain, fill_verify, fill_check, fill_help; /* insight_tables.c, verify_table.c */
-scalar_call call_version, call_build_info, call_bbox, call_circle, call_mesh, call_height; /* scalar.c */
-scalar_call call_block_info, call_block_check, call_block_dump;                            /* block_functions.c */
-scalar_call call_delta;                                                                    /* delta.c */
+scalar_call call_version, call_build_info, call_mesh, call_height;         /* scalar.c */
+scalar_call call_block_info, call_block_check, call_block_dump;            /* block_functions.c */
+scalar_call call_bbox, call_circle, call_corridor;                         /* shapes.c */
+scalar_call call_delta;                                                    /* delta.c */
 
 #endif

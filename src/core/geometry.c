@@ -5,6 +5,8 @@
  * never closed silently: whoever wrote it may have lost more than its last point. Empty members are dropped. */
 #include "geometry.h"
 
+#include <math.h>
+
 static const char *const type_names[GEOMETRY_TYPES] = {
     "GEOMETRY",          "POINT",        "LINESTRING",         "POLYGON",        "MULTIPOINT",
     "MULTILINESTRING",   "MULTIPOLYGON", "GEOMETRYCOLLECTION", "CIRCULARSTRING", "COMPOUNDCURVE",
@@ -146,4 +148,55 @@ void rqt_geometry_free(rqt_geometry *geometry) {
 
 int32_t rqt_geometry_srid(const rqt_geometry *geometry) {
     return geometry->srid;
+}
+
+/* ------------------------------------------------------------------------------------------ lines, and turns */
+
+size_t rqt_geometry_members(const rqt_geometry *geometry) {
+    return geometry->part_count;
+}
+
+const double *rqt_geometry_line(const rqt_geometry *geometry, size_t n, size_t *points) {
+    const geometry_part *part = &geometry->parts[n];
+    *points = 0;
+    if (part->type == GEOMETRY_POLYGON) return NULL;
+    *points = geometry->rings[part->first].count;
+    return &geometry->points[geometry->rings[part->first].first].x;
+}
+
+/* The part once more, moved in x. */
+static rqt_status add_moved(rqt_geometry *g, size_t part, double by) {
+    const geometry_part from = g->parts[part];
+    rqt_status status = geometry_open_part(g, from.type, NULL);
+    for (size_t r = 0; r < from.count && status == RQT_OK; r++) {
+        const geometry_ring ring = g->rings[from.first + r];
+        status = geometry_open_ring(g, NULL);
+        for (size_t i = 0; i < ring.count && status == RQT_OK; i++) {
+            const geometry_point p = g->points[ring.first + i];
+            status = geometry_add_point(g, p.x + by, p.y, NULL);
+        }
+    }
+    return status;
+}
+
+rqt_status rqt_geometry_repeat(rqt_geometry *g, double period, double low, double high) {
+    const size_t parts = g->part_count;
+    for (size_t p = 0; p < parts; p++) {
+        double least = INFINITY, most = -INFINITY;
+        const geometry_part part = g->parts[p];
+        for (size_t r = 0; r < part.count; r++)
+            for (size_t i = 0; i < g->rings[part.first + r].count; i++) {
+                const double x = g->points[g->rings[part.first + r].first + i].x;
+                least = fmin(least, x);
+                most = fmax(most, x);
+            }
+        if (!(least >= -3 * period && most <= 3 * period)) continue;
+        const double first = ceil((low - most) / period), last = floor((high - least) / period);
+        for (double turn = first; turn <= last; turn++) {
+            if (turn == 0) continue; /* the part where it is */
+            const rqt_status status = add_moved(g, p, turn * period);
+            if (status != RQT_OK) return status;
+        }
+    }
+    return RQT_OK;
 }

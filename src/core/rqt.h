@@ -450,6 +450,13 @@ rqt_status rqt_geometry_parse(const void *bytes, size_t n, bool text, const rqt_
 void rqt_geometry_free(rqt_geometry *geometry);
 /* 0 when the geometry names none (GeoPackage's 0 and -1 count as none). */
 int32_t rqt_geometry_srid(const rqt_geometry *geometry);
+/* How many members it has; and the coordinates x,y of member n with the number of its points, if it is a line or a
+ * point: NULL when it is a polygon. */
+size_t rqt_geometry_members(const rqt_geometry *geometry);
+const double *rqt_geometry_line(const rqt_geometry *geometry, size_t n, size_t *points);
+/* Adds to every member its copies at each multiple of `period` that, added to its x, puts its box on [low, high]:
+ * longitudes are the same modulo 360. A member with coordinates beyond three periods gets none. */
+rqt_status rqt_geometry_repeat(rqt_geometry *geometry, double period, double low, double high);
 
 /* Where the samples of a terrain lie: sample (col,row) is at (x0 + col*dx, y0 + row*dy). dx, dy finite, not 0. */
 typedef struct rqt_placement {
