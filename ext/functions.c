@@ -123,6 +123,17 @@ const function rqt_functions[] = {
      .least = 2,
      .most = 4,
      .flags = READS},
+    {.name = "rqt_profile",
+     .arguments = "line, eps [, terrain]",
+     .returns = "distance, x, y, z",
+     .purpose =
+         "The heights of the mesh along a line: a row for its own points and for every edge of the mesh that it "
+         "crosses, in its order; between two rows the mesh is a plane. In degrees the line follows geodesics "
+         "and distance, from its start, is geodesic; else both are straight. Metres. Where there is no mesh, "
+         "rows with z NULL say where the gap begins and ends; before the first place on the mesh and after the "
+         "last there are none.",
+     .example = "SELECT count(*), max(z) FROM rqt_profile('LINESTRING(-71.4 44.2, -71.3033 44.2705)', 10)",
+     .fill = fill_profile},
     {.name = "rqt_bbox",
      .arguments = "x0, y0, x1, y1 [, srid]",
      .returns = "GeoPackage geometry",

@@ -100,7 +100,9 @@ typedef struct line_set {
 int lines_read(sqlite3_value *value, line_set *lines, char **error);
 void lines_free(line_set *lines);
 /* Is it in the terrain's CRS? */
-int request_place(rqt_geometry *geometry, const char *what, const store_terrain *t, char **error);
+int request_place(int32_t srid, const char *what, const store_terrain *t, char **error);
+/* Metres in a unit of a terrain's x and y, where they are no angles; 1 when its CRS does not say. */
+double terrain_metre(const store_terrain *t);
 /* Longitudes are the same modulo 360: add the copies that meet the terrain, if it is in degrees. */
 int request_turn(rqt_geometry *geometry, const store_terrain *t);
 /* Options of the contract; sentences name what is unknown and what is not in this version. options.c */
@@ -111,6 +113,7 @@ int fail(char **error, const char *format, ...);
 
 /* The functions themselves, by file. */
 fill_rows fill_range, fill_triangles, fill_strip;                          /* mesh_tables.c */
+fill_rows fill_profile;                                                    /* profile.c */
 fill_rows fill_terrains, fill_explain, fill_verify, fill_check, fill_help; /* insight_tables.c, verify_table.c */
 scalar_call call_version, call_build_info, call_mesh, call_height;         /* scalar.c */
 scalar_call call_block_info, call_block_check, call_block_dump;            /* block_functions.c */

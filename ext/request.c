@@ -80,13 +80,16 @@ void lines_free(line_set *lines) {
     *lines = (line_set){0};
 }
 
-int request_place(rqt_geometry *geometry, const char *what, const store_terrain *t, char **error) {
-    const int32_t srid = rqt_geometry_srid(geometry);
+int request_place(int32_t srid, const char *what, const store_terrain *t, char **error) {
     if (srid != 0 && srid != t->srid && !(srid == 4326 && t->wgs84))
         return fail(error,
                     "%s has SRID %d, terrain %s has SRID %d; transforming between them is not in this version",
                     what, srid, t->name, t->srid);
     return SQLITE_OK;
+}
+
+double terrain_metre(const store_terrain *t) {
+    return t->cost.cell / fmax(fabs(t->placement.dx), fabs(t->placement.dy));
 }
 
 int request_turn(rqt_geometry *geometry, const store_terrain *t) {
@@ -98,7 +101,8 @@ int request_turn(rqt_geometry *geometry, const store_terrain *t) {
 
 static int read_region(request *r, sqlite3_value *value, char **error) {
     int code = request_geometry(value, "region", &r->geometry, error);
-    if (code == SQLITE_OK && r->geometry) code = request_place(r->geometry, "region", r->terrain, error);
+    if (code == SQLITE_OK && r->geometry)
+        code = request_place(rqt_geometry_srid(r->geometry), "region", r->terrain, error);
     if (code == SQLITE_OK && r->geometry) code = request_turn(r->geometry, r->terrain);
     if (code != SQLITE_OK) return code;
     const rqt_status status =

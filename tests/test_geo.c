@@ -192,7 +192,8 @@ static void F28_circles_over_a_pole_hold_it_and_what_is_near(void **state) {
             const double lat = south ? -lats[i] : lats[i], lon = dice(-360, 360);
             const double to_pole = distance(lon, lat, lon, south ? -90 : 90);
             const double to_far = distance(lon, lat, lon, south ? 90 : -90);
-            const double radii[] = {to_pole + 0.1, to_pole + 1000, to_pole * 1.2 + 5e4, to_far - 1000};
+            const double radii[] = {to_pole + 0.1, to_pole + 1000, to_pole + 0.3 * (to_far - to_pole),
+                                    to_far - 1000};
             for (size_t k = 0; k < 4; k++) {
                 geo_polygons c;
                 make_circle(lon, lat, radii[k], &c);

@@ -137,6 +137,27 @@ rqt_status rqt_geometry_parse(const void *bytes, size_t n, bool text, const rqt_
     return RQT_OK;
 }
 
+rqt_status rqt_geometry_of_lines(const double *xy, const size_t *counts, size_t lines, int32_t srid,
+                                 const rqt_allocator *allocator, rqt_geometry **geometry) {
+    *geometry = NULL;
+    rqt_geometry *g = memory_take(allocator, sizeof *g);
+    if (!g) return RQT_NO_MEMORY;
+    *g = (rqt_geometry){.allocator = *allocator, .srid = srid};
+    rqt_status status = RQT_OK;
+    for (size_t l = 0; l < lines && status == RQT_OK; l++) {
+        if (counts[l] == 0) continue;
+        status = geometry_open_part(g, counts[l] == 1 ? GEOMETRY_POINT : GEOMETRY_LINE, NULL);
+        if (status == RQT_OK) status = geometry_open_ring(g, NULL);
+        for (size_t i = 0; i < counts[l] && status == RQT_OK; i++, xy += 2)
+            status = isfinite(xy[0]) && isfinite(xy[1]) ? geometry_add_point(g, xy[0], xy[1], NULL) : RQT_INVALID;
+    }
+    if (status == RQT_OK)
+        *geometry = g;
+    else
+        rqt_geometry_free(g);
+    return status;
+}
+
 void rqt_geometry_free(rqt_geometry *geometry) {
     if (!geometry) return;
     rqt_allocator a = geometry->allocator;

@@ -60,6 +60,26 @@ int geo_circle(double lon, double lat, double metres, geo_polygons *out, char *m
 int geo_corridor(const double *lonlat, const size_t *line_points, size_t lines, double metres, geo_polygons *out,
                  char *message, int message_size);
 
+/* ------------------------------------------------------------------------------------------------ paths --
+ * Lines joined by geodesics, as straight pieces in lon,lat that are near them. Lines as for geo_corridor. */
+typedef struct geo_path {
+    double *lonlat;      /* points, lines one after the other; a line of equal points has one */
+    double *metres;      /* of each point, along the lines from the very first; from line to line none are added */
+    unsigned char *own;  /* is the point one of the line's own? */
+    unsigned char *ends; /* is it the last of its line? */
+    size_t *line_points; /* of each line */
+    size_t points, lines;
+} geo_path;
+void geo_path_free(geo_path *path);
+#define GEO_PATH_TOLERANCE 1e-3 /* of a cell: the most that a piece is off its geodesic */
+#define GEO_PATH_POINTS 5000000
+/* cell_lon, cell_lat: a cell's sides, degrees. Longitudes go on as for geo_corridor. A geodesic over a pole goes
+ * along it, latitude 90, from one meridian to the other. */
+int geo_path_create(const geo_ellipsoid *ellipsoid, const double *lonlat, const size_t *line_points, size_t lines,
+                    double cell_lon, double cell_lat, geo_path *out, char *message, int message_size);
+/* The geodesic distance of two points. */
+double geo_distance(const geo_ellipsoid *ellipsoid, const double from[2], const double to[2]);
+
 /* GeographicLib's version, as text of static life. */
 const char *geo_version(void);
 
