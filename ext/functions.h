@@ -71,9 +71,12 @@ typedef struct request {
     rqt_region *region;
     double eps;
     store_query_options options;
-    bool fans;            /* the strip goes round the centres of blocks */
-    int64_t max_vertices; /* 0: any number */
-    double achieved_eps;  /* of the mesh: eps, or more to keep within max_vertices; known after request_patch */
+    bool border;           /* mode border */
+    struct cJSON *detail;  /* the option, as it came; NULL: none */
+    struct places *places; /* what it says; detail.c */
+    bool fans;             /* the strip goes round the centres of blocks */
+    int64_t max_vertices;  /* 0: any number */
+    double achieved_eps;   /* of the mesh: eps, or more to keep within max_vertices; known after request_patch */
 } request;
 
 int request_read(connection *c, sqlite3_value *region, sqlite3_value *eps, sqlite3_value *terrain,
@@ -83,12 +86,19 @@ int request_patch(request *r, rqt_product product, rqt_patch *patch, store_reads
 /* The patch in wire format. delta.c */
 int wire_mesh(request *r, uint8_t **bytes, size_t *size, char **error);
 void request_free(request *r);
+/* A geometry, n bytes of text or BLOB, in the coordinates of the terrain; `what` it is, for sentences. */
+int request_geometry(const request *r, const void *bytes, size_t n, bool text, const char *what,
+                     rqt_geometry **geometry, char **error);
+/* The same as a region. */
+int request_region(const request *r, const rqt_geometry *geometry, const char *what, rqt_region **region,
+                   char **error);
+/* The rule of what the options detail and mode want, when terrain and region are known. detail.c */
+int rule_read(request *r, char **error);
+void rule_free(request *r);
 /* The terrain that a value names; NULL value: the only one. */
 int request_terrain(store *s, sqlite3_value *name, const store_terrain **terrain, char **error);
 /* "what must be a number ...": false and a sentence when the value is none, or NaN. */
 bool request_number(sqlite3_value *value, const char *what, double *number, char **error);
-/* A geometry out of a value; *geometry is NULL for NULL. what: the argument's name. */
-int request_geometry(sqlite3_value *value, const char *what, rqt_geometry **geometry, char **error);
 /* The lines of a geometry (points are lines of one point), for functions that want a line: line i has counts[i]
  * points of x,y, one line after the other. SQLITE_ERROR for NULL, an empty geometry and polygons. */
 typedef struct line_set {
@@ -97,7 +107,7 @@ typedef struct line_set {
     size_t count, points;
     int32_t srid;
 } line_set;
-int lines_read(sqlite3_value *value, line_set *lines, char **error);
+int lines_read(sqlite3_value *value, line_set *lines, char **error); /* lines.c */
 void lines_free(line_set *lines);
 /* Is it in the terrain's CRS? */
 int request_place(int32_t srid, const char *what, const store_terrain *t, char **error);

@@ -117,4 +117,14 @@ void region_tree_build(region_box *nodes, size_t count);
 void region_search_begin(region_search *s, const region_box *nodes, size_t count, const region_box *box);
 bool region_search_next(region_search *s, size_t *item);
 
+/* ------------------------------------------------------------------------------------------- region.c --
+ * What rules ask of a region beside the questions of rqt.h. */
+/* A box around all of it; false when it is empty. */
+bool region_extent(const rqt_region *region, region_box *box);
+/* Does the closed region share a point with the closed box? A polygon is the closure of its interior. */
+bool region_touches(const rqt_region *region, const region_box *box);
+/* rqt_region_box_relation and rqt_region_meets for the members with an area alone. */
+rqt_relation region_area_relation(const rqt_region *region, int32_t x0, int32_t y0, int32_t x1, int32_t y1);
+bool region_area_meets(const rqt_region *region, rqt_vertex a, rqt_vertex b, rqt_vertex c);
+
 #endif
