@@ -16,8 +16,8 @@
  * Lists of more than a few pieces, and the list of polygons, have a tree over their boxes, all in one array. Pieces
  * keep the order of their rings, whose neighbours are near. A question costs O(log n + hits) for borders that do
  * not fold to and fro; nothing is written after rqt_region_create, so any number of threads may ask. */
+#include "cut.h"
 #include "geometry.h"
-#include "region_edges.h"
 
 #include <math.h>
 
@@ -249,13 +249,24 @@ bool rqt_region_box(const rqt_region *region, int32_t *x0, int32_t *y0, int32_t 
     return true;
 }
 
+/* The sign of region_side of a finer point. With b - a = d it is that of floor's side * 2^bits + d x (x, y), whose
+ * last term is split at 2^bits too: so no number is larger than the first. */
+static int side_of_fine(const region_piece *piece, const region_fine_point *p) {
+    const __int128 below = (__int128)(piece->b.x - piece->a.x) * p->y - (__int128)(piece->b.y - piece->a.y) * p->x;
+    const __int128 carry = below >> p->bits; /* rounded down */
+    const __int128 whole = region_side(piece->a, piece->b, p->floor) + carry;
+    if (whole != 0) return whole > 0 ? 1 : -1;
+    return below - carry * ((__int128)1 << p->bits) > 0;
+}
+
 /* The parity of a point that lies on no piece: how many pieces a ray to the left or right crosses, whichever side
  * of the polygon is nearer. A piece counts from its upper end, with, to its lower end, without; so the ray may pass
  * through corners. */
-static bool is_inside(const rqt_region *region, const region_polygon *polygon, region_point p) {
+static bool is_inside_fine(const rqt_region *region, const region_polygon *polygon, const region_fine_point *fine) {
     const region_box *box = &polygon->box;
+    const region_point p = fine->floor; /* what is below its unit changes nothing but the side of a piece */
     if (p.x < box->x0 || p.x > box->x1 || p.y < box->y0 || p.y > box->y1) return false;
-    if (polygon->is_box) return true;
+    if (polygon->is_box) return (p.x < box->x1 || fine->x == 0) && (p.y < box->y1 || fine->y == 0);
     bool left = p.x - box->x0 < box->x1 - p.x, odd = false;
     region_box ray = {left ? box->x0 : p.x, p.y, left ? p.x : box->x1, p.y};
     region_search s;
@@ -264,11 +275,16 @@ static bool is_inside(const rqt_region *region, const region_polygon *polygon, r
         const region_piece *piece = &region->border.items[polygon->first + i];
         bool a_above = piece->a.y <= p.y, b_above = piece->b.y <= p.y;
         if (a_above == b_above) continue;
-        __int128 side = region_side(piece->a, piece->b, p);
+        const int side = side_of_fine(piece, fine);
         bool is_right = a_above ? side > 0 : side < 0; /* of p is the piece */
         if (is_right != left) odd = !odd;
     }
     return odd;
+}
+
+static bool is_inside(const rqt_region *region, const region_polygon *polygon, region_point p) {
+    const region_fine_point fine = {.floor = p};
+    return is_inside_fine(region, polygon, &fine);
 }
 
 static bool polygon_meets(const rqt_region *region, const region_polygon *polygon, const region_triangle *t) {
@@ -416,4 +432,56 @@ bool rqt_region_contains(const rqt_region *region, rqt_vertex sample) {
         if (!on_border && is_inside(region, polygon, p)) return true;
     }
     return false;
+}
+
+/* ------------------------------------------------------------------------------------- what mode `cut` asks -- */
+bool region_holds(const rqt_region *region, const region_fine_point *p) {
+    const region_box place = {p->floor.x, p->floor.y, p->floor.x, p->floor.y};
+    region_search s;
+    region_search_begin(&s, region->nodes, region->polygon_count, &place);
+    for (size_t i; region_search_next(&s, &i);)
+        if (is_inside_fine(region, &region->polygons[i], p)) return true;
+    return false;
+}
+
+bool region_thin_touches(const rqt_region *region, const region_triangle *t) {
+    region_search s;
+    region_search_begin(&s, region->nodes + region->thin_tree, region->thin.count, &t->box);
+    for (size_t i; region_search_next(&s, &i);)
+        if (region_triangle_is_touched(t, &region->thin.items[i])) return true;
+    return false;
+}
+
+void region_border_begin(region_border_search *s, const rqt_region *region, const region_box *box) {
+    *s = (region_border_search){.region = region, .box = *box, .side = 4};
+    region_search_begin(&s->polygons, region->nodes, region->polygon_count, box);
+}
+
+bool region_border_next(region_border_search *s, region_piece *piece) {
+    for (;;) {
+        size_t i;
+        if (s->is_open && region_search_next(&s->pieces, &i)) {
+            *piece = s->region->border.items[s->first + i];
+            return true;
+        }
+        s->is_open = false;
+        while (s->side < 4) { /* of a rectangle, which keeps no pieces; ends as odd pieces have them */
+            const region_box *r = &s->rectangle;
+            const int n = s->side++;
+            *piece = (region_piece){{n == 3 ? r->x1 : r->x0, n == 1 ? r->y1 : r->y0},
+                                    {n == 2 ? r->x0 : r->x1, n == 0 ? r->y0 : r->y1}};
+            const region_box box = region_piece_box(piece);
+            if (region_boxes_touch(&box, &s->box)) return true;
+        }
+        if (!region_search_next(&s->polygons, &i)) return false;
+        const region_polygon *polygon = &s->region->polygons[i];
+        if (polygon->is_box) {
+            s->rectangle = polygon->box;
+            s->side = 0;
+        } else {
+            s->first = polygon->first;
+            region_search_begin(&s->pieces, s->region->nodes + polygon->tree, polygon->count, &s->box);
+            s->is_open = true;
+        }
+    }
 }

@@ -641,6 +641,33 @@ typedef struct rqt_leaf_corner {
 rqt_found rqt_query_leaf_at(const rqt_query *query, const rqt_answer *answer, const rqt_block *block, int64_t x,
                             int64_t y, rqt_leaf_corner leaf[3]);
 
+/* ----------------------------------------------------------------------------------------------- cut --
+ * Mode `cut`: the patch clipped to the region. Its triangles tile what the region and the leaves of the patch have
+ * in common; they have an area, turn counter-clockwise and share whole edges. Vertices on the region's border are
+ * samples no longer, but places between samples, with heights on the leaf's plane: in quanta, not whole ones. */
+typedef struct rqt_cut_vertex {
+    double col, row; /* multiples of 2^(lattice.K - 52) sample: exact */
+    double q;
+    rqt_code error; /* as in the patch; 0 where the vertex is no sample of it: the mesh needs it for no height */
+    int16_t level;  /* as in the patch; -1 there */
+} rqt_cut_vertex;
+
+typedef struct rqt_cut {
+    rqt_cut_vertex *vertices; /* each once, in the order of the triangles */
+    size_t vertex_count;
+    uint32_t *triangles; /* as in rqt_patch */
+    size_t triangle_count;
+    rqt_allocator allocator;
+    size_t vertex_capacity, triangle_capacity;
+} rqt_cut;
+
+/* patch: what a query has made of region, with triangles. Of members without an area (lines, points), whole leaves
+ * stay. is_interrupted may be NULL. RQT_INTERRUPTED, RQT_NO_MEMORY: cut is empty. */
+rqt_status rqt_cut_make(const rqt_patch *patch, const rqt_region *region, const rqt_lattice *lattice,
+                        const rqt_allocator *allocator, bool (*is_interrupted)(void *context), void *context,
+                        rqt_cut *cut);
+void rqt_cut_free(rqt_cut *cut);
+
 /* One generalized strip of a patch: n indices; triangle i is (s[i], s[i+1], s[i+2]), its last two swapped for odd
  * i, counter-clockwise; a triangle with two equal vertices is a join. An empty patch gives n = 0.
  * Release with allocator->resize(context, strip, 0). */
