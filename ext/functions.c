@@ -134,6 +134,17 @@ const function rqt_functions[] = {
          "last there are none.",
      .example = "SELECT count(*), max(z) FROM rqt_profile('LINESTRING(-71.4 44.2, -71.3033 44.2705)', 10)",
      .fill = fill_profile},
+    {.name = "rqt_area",
+     .arguments = MESH,
+     .returns = "planimetric, surface, volume",
+     .purpose =
+         "How large a region is on the mesh, voids left out: its area at height 0, the area of its surface, and "
+         "the volume above height 0 (less what is below), in metres. The mesh is cut at the region's border, "
+         "unless options name another mode. In degrees everything is on the terrain's ellipsoid, with heights "
+         "taken as above it; else plane.",
+     .example = "SELECT round(planimetric), surface > planimetric FROM rqt_area(" SUMMIT ", 10)",
+     .fill = fill_area,
+     .hidden = "achieved_eps"},
     {.name = "rqt_bbox",
      .arguments = "x0, y0, x1, y1 [, srid]",
      .returns = "GeoPackage geometry",

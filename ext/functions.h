@@ -72,6 +72,7 @@ typedef struct request {
     double eps;
     store_query_options options;
     bool border;           /* mode border */
+    bool whole;            /* the options name a mode of whole triangles */
     struct cJSON *detail;  /* the option, as it came; NULL: none */
     struct places *places; /* what it says; detail.c */
     bool fans;             /* the strip goes round the centres of blocks */
@@ -123,7 +124,7 @@ int fail(char **error, const char *format, ...);
 
 /* The functions themselves, by file. */
 fill_rows fill_range, fill_triangles, fill_strip;                          /* mesh_tables.c */
-fill_rows fill_profile;                                                    /* profile.c */
+fill_rows fill_profile, fill_area;                                         /* profile.c, area.c */
 fill_rows fill_terrains, fill_explain, fill_verify, fill_check, fill_help; /* insight_tables.c, verify_table.c */
 scalar_call call_version, call_build_info, call_mesh, call_height;         /* scalar.c */
 scalar_call call_block_info, call_block_check, call_block_dump;            /* block_functions.c */

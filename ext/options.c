@@ -69,7 +69,10 @@ static int read_one(const cJSON *item, request *r, char **error) {
     /* The lists above are in the order of the enumerations. */
     if (strcmp(c->key, "select") == 0) r->options.select = (rqt_select)index_of(c, value);
     if (strcmp(c->key, "metric") == 0) r->options.metric = (rqt_metric)index_of(c, value);
-    if (strcmp(c->key, "mode") == 0) r->border = strcmp(value, "border") == 0;
+    if (strcmp(c->key, "mode") == 0) {
+        r->border = strcmp(value, "border") == 0;
+        r->whole = strcmp(value, "cut") != 0;
+    }
     if (strcmp(c->key, "strip") == 0) r->fans = strcmp(value, "fan") == 0;
     return SQLITE_OK;
 }

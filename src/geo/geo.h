@@ -80,6 +80,13 @@ int geo_path_create(const geo_ellipsoid *ellipsoid, const double *lonlat, const 
 /* The geodesic distance of two points. */
 double geo_distance(const geo_ellipsoid *ellipsoid, const double from[2], const double to[2]);
 
+/* ----------------------------------------------------------------------------------------------- areas -- */
+typedef struct geo_measure {
+    double planimetric, surface, volume; /* square metres at height 0; square metres; cubic metres above height 0 */
+} geo_measure;
+/* Of a triangle with corners lon, lat, height above the ellipsoid, straight in all three: surface.cpp. */
+geo_measure geo_measure_triangle(const geo_ellipsoid *ellipsoid, const double lonlath[3][3]);
+
 /* GeographicLib's version, as text of static life. */
 const char *geo_version(void);
 
