@@ -72,7 +72,7 @@ typedef struct geo_path {
 } geo_path;
 void geo_path_free(geo_path *path);
 #define GEO_PATH_TOLERANCE 1e-3 /* of a cell: the most that a piece is off its geodesic */
-#define GEO_PATH_POINTS 5000000
+#define GEO_PATH_POINTS 1000000
 /* cell_lon, cell_lat: a cell's sides, degrees. Longitudes go on as for geo_corridor. A geodesic over a pole goes
  * along it, latitude 90, from one meridian to the other. */
 int geo_path_create(const geo_ellipsoid *ellipsoid, const double *lonlat, const size_t *line_points, size_t lines,
