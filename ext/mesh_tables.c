@@ -11,11 +11,13 @@ typedef struct mesh {
     double factor; /* rqt_unit_factor */
     store *store;  /* lives as long as the table does */
     double achieved_eps;
+    double *xyz; /* of each vertex, in a frame of its own; NULL: the terrain's CRS */
 } mesh;
 
 static void release(void *data) {
     mesh *m = data;
     store_keep(m->store, &m->patch);
+    sqlite3_free(m->xyz);
     sqlite3_free(m);
 }
 
@@ -25,7 +27,9 @@ static void put_coordinate(const mesh *m, uint32_t vertex, int which, sqlite3_co
     const rqt_placement *at = &m->frame.placement;
     const rqt_unit *unit = &m->frame.unit;
     double value;
-    if (which == 0)
+    if (m->xyz)
+        value = m->xyz[3 * (size_t)vertex + (size_t)which];
+    else if (which == 0)
         value = at->x0 + v->col * at->dx;
     else if (which == 1)
         value = at->y0 + v->row * at->dy;
@@ -49,6 +53,10 @@ static int make_mesh(connection *c, sqlite3_value **arguments, rqt_product produ
         m->store = r.store;
         code = request_patch(&r, product, &m->patch, NULL, error);
         m->achieved_eps = r.achieved_eps;
+        if (code == SQLITE_OK && r.frame) {
+            code = frame_merge(r.frame, &m->patch);
+            if (code == SQLITE_OK) code = frame_places(r.frame, &m->patch, &m->xyz, error);
+        }
     }
     request_free(&r);
     if (code != SQLITE_OK) {

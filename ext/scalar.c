@@ -73,14 +73,43 @@ static int own_format(const request *r, const rqt_patch *patch, rqt_mesh_kind ki
     return code;
 }
 
-static int other_format(const request *r, const rqt_patch *patch, format_kind kind, uint8_t **bytes, size_t *size,
+static void framed_coordinates(const void *context, size_t vertex, double xyz[3]) {
+    memcpy(xyz, (const double *)context + 3 * vertex, 3 * sizeof *xyz);
+}
+
+/* In a frame of its own: geocentric has an SRID, east-north-up has none. */
+static int framed_format(const request *r, rqt_patch *patch, format_kind kind, uint8_t **bytes, size_t *size,
+                         rqt_status *status, char **error) {
+    double *xyz = NULL;
+    int code = frame_merge(r->frame, patch);
+    if (code == SQLITE_OK) code = frame_places(r->frame, patch, &xyz, error);
+    const format_mesh mesh = {.vertex_count = patch->vertex_count,
+                              .triangle_count = patch->triangle_count,
+                              .triangles = patch->triangles,
+                              .coordinates = framed_coordinates,
+                              .context = xyz,
+                              .srid = r->frame_kind == FRAME_ECEF ? 4978 : 0,
+                              .title = frame_title(r->frame),
+                              .eps = r->achieved_eps};
+    if (code == SQLITE_OK) *status = format_write(&mesh, kind, store_allocator(), bytes, size);
+    sqlite3_free(xyz);
+    return code;
+}
+
+static int other_format(const request *r, rqt_patch *patch, format_kind kind, uint8_t **bytes, size_t *size,
                         char **error) {
     const format_frame frame = {.placement = r->terrain->placement,
                                 .unit = r->terrain->unit,
                                 .srid = r->terrain->srid,
                                 .title = r->terrain->name,
                                 .eps = r->achieved_eps};
-    const rqt_status status = format_patch(patch, &frame, kind, store_allocator(), bytes, size);
+    rqt_status status = RQT_OK;
+    if (!r->frame) {
+        status = format_patch(patch, &frame, kind, store_allocator(), bytes, size);
+    } else {
+        const int code = framed_format(r, patch, kind, bytes, size, &status, error);
+        if (code != SQLITE_OK) return code;
+    }
     if (status == RQT_OK) return SQLITE_OK;
     if (status == RQT_NO_MEMORY) return SQLITE_NOMEM;
     return fail(error, "the mesh is larger than 2 GiB in this format; ask for less or a larger eps");
@@ -108,6 +137,9 @@ void call_mesh(sqlite3_context *result, int count, sqlite3_value **arguments) {
     if (code == SQLITE_OK)
         code = request_read(c, arguments[0], arguments[1], count > 3 ? arguments[3] : NULL,
                             count > 4 ? arguments[4] : NULL, &r, &error);
+    if (code == SQLITE_OK && r.frame && !other)
+        code =
+            fail(&error, "format \"%s\" holds samples, not points in space: option \"frame\" must be crs", format);
     if (code == SQLITE_OK && wire)
         code = wire_mesh(&r, &bytes, &size, &error);
     else if (code == SQLITE_OK)
