@@ -73,13 +73,19 @@ static int own_format(const request *r, const rqt_patch *patch, rqt_mesh_kind ki
     return code;
 }
 
+static int format_failed(rqt_status status, char **error) {
+    if (status == RQT_OK) return SQLITE_OK;
+    if (status == RQT_NO_MEMORY) return SQLITE_NOMEM;
+    return fail(error, "the mesh is larger than 2 GiB in this format; ask for less or a larger eps");
+}
+
 static void framed_coordinates(const void *context, size_t vertex, double xyz[3]) {
     memcpy(xyz, (const double *)context + 3 * vertex, 3 * sizeof *xyz);
 }
 
 /* In a frame of its own: geocentric has an SRID, east-north-up has none. */
 static int framed_format(const request *r, rqt_patch *patch, format_kind kind, uint8_t **bytes, size_t *size,
-                         rqt_status *status, char **error) {
+                         char **error) {
     double *xyz = NULL;
     int code = frame_merge(r->frame, patch);
     if (code == SQLITE_OK) code = frame_places(r->frame, patch, &xyz, error);
@@ -91,28 +97,54 @@ static int framed_format(const request *r, rqt_patch *patch, format_kind kind, u
                               .srid = r->frame_kind == FRAME_ECEF ? 4978 : 0,
                               .title = frame_title(r->frame),
                               .eps = r->achieved_eps};
-    if (code == SQLITE_OK) *status = format_write(&mesh, kind, store_allocator(), bytes, size);
+    if (code == SQLITE_OK) code = format_failed(format_write(&mesh, kind, store_allocator(), bytes, size), error);
     sqlite3_free(xyz);
     return code;
 }
 
 static int other_format(const request *r, rqt_patch *patch, format_kind kind, uint8_t **bytes, size_t *size,
                         char **error) {
+    if (r->frame) return framed_format(r, patch, kind, bytes, size, error);
     const format_frame frame = {.placement = r->terrain->placement,
                                 .unit = r->terrain->unit,
                                 .srid = r->terrain->srid,
                                 .title = r->terrain->name,
                                 .eps = r->achieved_eps};
-    rqt_status status = RQT_OK;
-    if (!r->frame) {
-        status = format_patch(patch, &frame, kind, store_allocator(), bytes, size);
-    } else {
-        const int code = framed_format(r, patch, kind, bytes, size, &status, error);
-        if (code != SQLITE_OK) return code;
-    }
-    if (status == RQT_OK) return SQLITE_OK;
-    if (status == RQT_NO_MEMORY) return SQLITE_NOMEM;
-    return fail(error, "the mesh is larger than 2 GiB in this format; ask for less or a larger eps");
+    return format_failed(format_patch(patch, &frame, kind, store_allocator(), bytes, size), error);
+}
+
+typedef struct cut_source {
+    const rqt_cut *cut;
+    const store_terrain *terrain;
+} cut_source;
+
+/* The one expression of the contract, between samples. */
+static void cut_coordinates(const void *context, size_t vertex, double xyz[3]) {
+    const cut_source *s = context;
+    const rqt_cut_vertex *v = &s->cut->vertices[vertex];
+    const rqt_placement *at = &s->terrain->placement;
+    const rqt_unit *unit = &s->terrain->unit;
+    xyz[0] = at->x0 + v->col * at->dx;
+    xyz[1] = at->y0 + v->row * at->dy;
+    xyz[2] = ((double)unit->z0 + v->q / (double)unit->d) * rqt_unit_factor(unit) + unit->offset;
+}
+
+static int cut_format(request *r, format_kind kind, uint8_t **bytes, size_t *size, char **error) {
+    rqt_cut cut;
+    int code = request_cut(r, &cut, error);
+    if (code != SQLITE_OK) return code;
+    const cut_source source = {&cut, r->terrain};
+    const format_mesh mesh = {.vertex_count = cut.vertex_count,
+                              .triangle_count = cut.triangle_count,
+                              .triangles = cut.triangles,
+                              .coordinates = cut_coordinates,
+                              .context = &source,
+                              .srid = r->terrain->srid,
+                              .title = r->terrain->name,
+                              .eps = r->achieved_eps};
+    code = format_failed(format_write(&mesh, kind, store_allocator(), bytes, size), error);
+    rqt_cut_free(&cut);
+    return code;
 }
 
 void call_mesh(sqlite3_context *result, int count, sqlite3_value **arguments) {
@@ -137,14 +169,22 @@ void call_mesh(sqlite3_context *result, int count, sqlite3_value **arguments) {
     if (code == SQLITE_OK)
         code = request_read(c, arguments[0], arguments[1], count > 3 ? arguments[3] : NULL,
                             count > 4 ? arguments[4] : NULL, &r, &error);
+    const bool cut = r.mode == REQUEST_CUT;
+    if (code == SQLITE_OK && !other) {
+        char what[40];
+        sqlite3_snprintf(sizeof what, what, "format \"%s\"", format);
+        code = request_refuse_cut(&r, what, &error);
+    }
     if (code == SQLITE_OK && r.frame && !other)
         code =
             fail(&error, "format \"%s\" holds samples, not points in space: option \"frame\" must be crs", format);
     if (code == SQLITE_OK && wire)
         code = wire_mesh(&r, &bytes, &size, &error);
+    else if (code == SQLITE_OK && cut)
+        code = cut_format(&r, kind, &bytes, &size, &error);
     else if (code == SQLITE_OK)
         code = request_patch(&r, strip ? RQT_PRODUCT_STRIP : RQT_PRODUCT_TRIANGLES, &patch, NULL, &error);
-    if (code == SQLITE_OK && !wire)
+    if (code == SQLITE_OK && !wire && !cut)
         code = other ? other_format(&r, &patch, kind, &bytes, &size, &error)
                      : own_format(&r, &patch, strip ? RQT_MESH_STRIP : RQT_MESH_INDEXED, &bytes, &size, &error);
     if (r.store) store_keep(r.store, &patch);

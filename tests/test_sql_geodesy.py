@@ -477,7 +477,7 @@ def frames():
     import_terrain(path, write_grid(temp("navd.asc"), flat, x0=8, y0=46, cell=0.01, crs=compound.replace("EGM96", "NAVD88")), name="navd")
     import_terrain(path, os.path.join(DATA, "etopo1_1deg.tif"), name="globe", block=4)
     db = connect(path)
-    for name, eps, most in (("flat", 1, 512), ("flat", 20, 32), ("tile", 3, 4600), ("tile", 8, 1500), ("wide", 500, 1024)):
+    for name, eps, most in (("flat", 1, 512), ("flat", 20, 32), ("tile", 3, 4700), ("tile", 8, 1500), ("wide", 500, 1024)):
         grid, cell, x0, y0 = grids[name]
         x, y, dx, dy = one(db, "SELECT x0, y0, dx, dy FROM rqt_terrains WHERE name = ?", name)
         worst, longest, _, triangles, vertices, seen, _, _ = prove_in_space(db, eps, name, grid, lambda c, r: (x + c * dx, y + r * dy))
