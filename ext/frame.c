@@ -217,7 +217,7 @@ int frame_read(request *r, char **error) {
     int code = f->seam ? read_seam(r, f, error) : SQLITE_OK;
     for (int p = 0; p < 2 && code == SQLITE_OK; p++)
         if (f->pole[p]) code = read_pole(r, f, p, error);
-    if (code == SQLITE_OK && r->eps < f->merging)
+    if (code == SQLITE_OK && rule_least_eps(r) < f->merging)
         code = fail(
             error,
             "option \"frame\":\"%s\": heights of terrain %s that are one place in space differ by up to %!.15g "

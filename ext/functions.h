@@ -104,6 +104,8 @@ int request_region(const request *r, rqt_geometry *geometry, const char *what, r
 /* The rule of what the options detail and mode want, when terrain and region are known. detail.c */
 int rule_read(request *r, char **error);
 void rule_free(request *r);
+/* The request's eps, or the least of its places' when that is less. */
+double rule_least_eps(const request *r);
 /* What the option frame wants, when all else is known: the rule is given what curvature takes. frame.c */
 int frame_read(request *r, char **error);
 void frame_free(space_frame *f);

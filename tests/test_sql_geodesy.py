@@ -318,6 +318,14 @@ def areas_on_the_ellipsoid():
     near("F25 areas: a box across the antimeridian",
          one(db, "SELECT planimetric FROM rqt_area(rqt_bbox(175, -5, -170, 5, 4326), 0, 'shell')"),
          (math.radians(15) * 2 * quarter(5),), 1e-10)
+    # the terrain's own ellipsoid: a sphere
+    sphere = WGS84.replace("WGS 84", "ball").replace("WGS_1984", "ball").replace("6378137,298.257223563", "6371000,0").replace(
+        ',AUTHORITY["EPSG","7030"]', "").replace(',AUTHORITY["EPSG","6326"]', "").replace(',AUTHORITY["EPSG","4326"]', "")
+    import_terrain(path, write_grid(temp("ball.asc"), [[0] * 21 for _ in range(21)], x0=10, y0=0, crs=sphere), name="ball")
+    near("areas: on the terrain's own ellipsoid", one(db, "SELECT * FROM rqt_area(rqt_bbox(11, 0, 15, 20), 0, 'ball')"),
+         (6371000 ** 2 * math.radians(4) * math.sin(math.radians(20)),) * 2 + (0,), 1e-9)
+    near("profiles: on the terrain's own ellipsoid", one(db, "SELECT max(distance) FROM rqt_profile('LINESTRING(11 0, 15 0)', 0, 'ball')"),
+         (6371000 * math.radians(4),))
     db.close()
 
 
@@ -567,6 +575,13 @@ def frames():
     check("F28 regions at the seam are parts of the closed mesh", east < both < whole and east)
     raises("F28 copies of the seam that differ by more than eps are refused", "differ by up to 1.0 metres; eps must be at least that",
            lambda: one(db, "SELECT count(*) FROM rqt_range(NULL, 0.5, 'globe', '{\"frame\":\"ecef\"}')"))
+    raises("F28 so is a place of detail with so small an eps", "eps must be at least that",
+           lambda: one(db, "SELECT count(*) FROM rqt_range(NULL, 50, 'globe', '{\"frame\":\"ecef\",\"detail\":[[\"POINT(0 0)\",0.5]]}')"))
+    fine, coarse = (one(db, "SELECT count(*) FROM rqt_range(NULL, 2000, 'globe', ?)", '{"frame":"ecef"%s}' % more) for more in
+                    (',"detail":[["POINT(10 50)",100]]', ""))
+    check("frames: places of detail are finer in space too", fine > coarse, (fine, coarse))
+    raises("frames: not with mode cut", 'option "frame" does not go with mode "cut"',
+           lambda: one(db, "SELECT count(*) FROM rqt_range(NULL, 50, 'globe', '{\"frame\":\"ecef\",\"mode\":\"cut\"}')"))
     db.close()
 
 

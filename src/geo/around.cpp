@@ -25,6 +25,8 @@
 
 namespace {
 
+using point = geo_point;
+
 using GeographicLib::Geodesic;
 using GeographicLib::GeodesicLine;
 
@@ -32,18 +34,9 @@ constexpr double SMALLEST_RADIUS = 1e-3, LARGEST_CORRIDOR = 5e6, POLE_MARGIN = 1
 constexpr double DEGREE = 0.017453292519943295, EARTH = 6378137; /* metres, near enough for a tolerance */
 constexpr int DEEPEST = 40;
 
-struct point {
-    double lon, lat;
-};
-
 struct ring {
     std::vector<point> points;
 };
-
-/* The longitude on the turn nearest to another. */
-double unroll(double lon, double near) {
-    return near + std::remainder(lon - near, 360);
-}
 
 /* ------------------------------------------------------------------------------------------------ tracing */
 
@@ -60,12 +53,12 @@ double off_side(point a, point b, point c) {
 template <class Curve>
 void trace(const Curve &curve, double t0, point a, double t1, point b, double tolerance, int depth,
            std::vector<point> &out) {
-    b.lon = unroll(b.lon, a.lon);
+    b.lon = geo_unroll(b.lon, a.lon);
     point between[3];
     bool near = std::fabs(b.lon - a.lon) < 90;
     for (int i = 0; i < 3; i++) {
         between[i] = curve(t0 + (t1 - t0) * (i + 1) / 4);
-        between[i].lon = unroll(between[i].lon, i == 0 ? a.lon : between[i - 1].lon);
+        between[i].lon = geo_unroll(between[i].lon, i == 0 ? a.lon : between[i - 1].lon);
         near = near && std::fabs(between[i].lon - a.lon) < 90;
     }
     for (int i = 0; i < 3 && near; i++) near = off_side(a, b, between[i]) <= tolerance;
@@ -84,7 +77,7 @@ void trace_parts(const Curve &curve, double t0, double t1, int n, double toleran
                  double lon) {
     point a = curve(t0);
     if (out.empty()) {
-        a.lon = unroll(a.lon, lon);
+        a.lon = geo_unroll(a.lon, lon);
         out.push_back(a);
     }
     for (int i = 1; i <= n; i++) {
@@ -123,7 +116,7 @@ class capsule {
                 trace_parts([&](double t) { return leave(begin, begin.azimuth - 90 - 180 * t); }, 0, 1, cap_parts,
                             tolerance, p, from.lon);
             else
-                p.push_back({unroll(p.front().lon, p.back().lon), p.front().lat});
+                p.push_back({geo_unroll(p.front().lon, p.back().lon), p.front().lat});
         }
         close();
     }
@@ -331,7 +324,7 @@ extern "C" int geo_corridor(const double *lonlat, const size_t *line_points, siz
                 point to = from;
                 if (!lone) {
                     check_point(p[2], p[3]);
-                    to = {unroll(p[2], from.lon), p[3]};
+                    to = {geo_unroll(p[2], from.lon), p[3]};
                     if (to.lon == from.lon && to.lat == from.lat) continue;
                 }
                 rims.push_back(capsule(from, to, metres, first, 4).rim);

@@ -4,13 +4,22 @@
 
 #include "geo.h"
 
-#include <cstdarg>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
 #include <new>
 #include <stdexcept>
 #include <vector>
+
+struct geo_point {
+    double lon, lat;
+};
+
+/* The longitude on the turn nearest to another. */
+inline double geo_unroll(double lon, double near) {
+    return near + std::remainder(lon - near, 360);
+}
 
 /* What ends a call with a sentence. */
 struct geo_refusal : std::runtime_error {

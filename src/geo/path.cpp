@@ -12,16 +12,10 @@
 
 namespace {
 
+using point = geo_point;
+
 using GeographicLib::Geodesic;
 using GeographicLib::GeodesicLine;
-
-struct point {
-    double lon, lat;
-};
-
-double unroll(double lon, double near) {
-    return near + std::remainder(lon - near, 360);
-}
 
 struct builder {
     double cell_lon, cell_lat;
@@ -48,10 +42,10 @@ struct builder {
     /* The inner points of the geodesic from s0 to s1. */
     point trace(const GeodesicLine &line, double from, double s0, point a, double s1, point b, int depth) {
         point between[3];
-        b.lon = unroll(b.lon, a.lon);
+        b.lon = geo_unroll(b.lon, a.lon);
         for (int i = 0; i < 3; i++) {
             line.Position(s0 + (s1 - s0) * (i + 1) / 4, between[i].lat, between[i].lon);
-            between[i].lon = unroll(between[i].lon, i == 0 ? a.lon : between[i - 1].lon);
+            between[i].lon = geo_unroll(between[i].lon, i == 0 ? a.lon : between[i - 1].lon);
         }
         bool near = std::fabs(b.lon - a.lon) < 90;
         for (int i = 0; i < 3 && near; i++) near = off(a, b, between[i]) <= 0.9 * GEO_PATH_TOLERANCE;
@@ -91,7 +85,7 @@ extern "C" int geo_path_create(const geo_ellipsoid *ellipsoid, const double *lon
                 if (!(std::fabs(p.lat) <= 90)) throw geo_refusal("a latitude of the line is beyond 90");
                 if (!(std::fabs(p.lon) <= 720)) throw geo_refusal("a longitude of the line is beyond 720");
                 if (i > 0) {
-                    p.lon = unroll(p.lon, last.lon);
+                    p.lon = geo_unroll(p.lon, last.lon);
                     if (p.lon == last.lon && p.lat == last.lat) continue;
                     const GeodesicLine line = earth.InverseLine(last.lat, last.lon, p.lat, p.lon);
                     const point end = path.trace(line, gone, 0, last, line.Distance(), p, 0);

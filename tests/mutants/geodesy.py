@@ -8,7 +8,7 @@ MUTANTS = [
      "9 * GEO_RIM_TOLERANCE", "test_geo", "corridors_hold_what_is_near_and_nothing_else"),
     ("geodesy: a rim round a pole is not closed over it", "src/geo/around.cpp", "if (std::fabs(turn) < 180) {",
      "if (std::fabs(turn) < 1e9) {", "test_geo", "F28_circles_over_a_pole_hold_it_and_what_is_near"),
-    ("geodesy: lines jump at the antimeridian", "src/geo/around.cpp", "to = {unroll(p[2], from.lon), p[3]};",
+    ("geodesy: lines jump at the antimeridian", "src/geo/around.cpp", "to = {geo_unroll(p[2], from.lon), p[3]};",
      "to = {p[2], p[3]};", "test_geo", "F25_corridors_across_the_antimeridian_go_on"),
     ("geodesy: a path is ten times coarser", "src/geo/path.cpp", "0.9 * GEO_PATH_TOLERANCE", "9 * GEO_PATH_TOLERANCE",
      "test_geo", "paths_follow_geodesics"),
@@ -44,6 +44,6 @@ MUTANTS = [
      SQL, "F28 the Earth at 150: closed at seam and poles"),
     ("frame: triangles without area at the poles stay", "ext/frame.c", "if (a == b || b == d || d == a) continue; /* at a pole */", "",
      SQL, "F28 the Earth at 150"),
-    ("frame: heights that become one may differ by anything", "ext/frame.c", "if (code == SQLITE_OK && r->eps < f->merging)",
+    ("frame: heights that become one may differ by anything", "ext/frame.c", "if (code == SQLITE_OK && rule_least_eps(r) < f->merging)",
      "if (false)", SQL, "F28 copies of the seam that differ by more than eps are refused"),
 ]
