@@ -274,6 +274,13 @@ int rule_read(request *r, char **error) {
     return status == RQT_OK ? SQLITE_OK : status == RQT_INTERRUPTED ? w.code : SQLITE_NOMEM;
 }
 
+double rule_least_eps(const request *r) {
+    double least = r->eps;
+    for (size_t i = 0; r->places && i < r->places->count; i++)
+        if (r->places->items[i].eps < least) least = r->places->items[i].eps;
+    return least;
+}
+
 void rule_free(request *r) {
     rqt_rule_free(r->options.rule);
     for (size_t i = 0; r->places && i < r->places->count; i++) rqt_region_free(r->places->regions[i]);

@@ -13,11 +13,13 @@ typedef struct mesh {
     double factor; /* rqt_unit_factor */
     store *store;  /* lives as long as the table does */
     double achieved_eps;
+    double *xyz; /* of each vertex, in a frame of its own; NULL: the terrain's CRS */
 } mesh;
 
 static void release(void *data) {
     mesh *m = data;
     store_keep(m->store, &m->patch);
+    sqlite3_free(m->xyz);
     rqt_cut_free(&m->cut);
     sqlite3_free(m);
 }
@@ -35,7 +37,9 @@ static void put_coordinate(const mesh *m, uint32_t vertex, int which, sqlite3_co
         col = v->col, row = v->row, q = v->q;
     }
     double value;
-    if (which == 0)
+    if (m->xyz)
+        value = m->xyz[3 * (size_t)vertex + (size_t)which];
+    else if (which == 0)
         value = at->x0 + col * at->dx;
     else if (which == 1)
         value = at->y0 + row * at->dy;
@@ -73,6 +77,10 @@ static int make_mesh(connection *c, sqlite3_value **arguments, rqt_product produ
         code = r.mode == REQUEST_CUT ? make_cut(&r, product, m, error)
                                      : request_patch(&r, product, &m->patch, NULL, error);
         m->achieved_eps = r.achieved_eps;
+        if (code == SQLITE_OK && r.frame) {
+            code = frame_merge(r.frame, &m->patch);
+            if (code == SQLITE_OK) code = frame_places(r.frame, &m->patch, &m->xyz, error);
+        }
     }
     request_free(&r);
     if (code != SQLITE_OK) {

@@ -8,7 +8,9 @@ database that `make demo` makes, and in the tests.
 
 **Region**: NULL (all), WKT or EWKT text, a GeoPackage or SpatiaLite geometry. Without an SRID it is in the terrain's CRS; with another
 SRID than the terrain's its vertices are transformed by SpatiaLite's ST_Transform, if mod_spatialite is loaded in the connection (in any
-database: plain, GeoPackage or SpatiaLite), else it is refused. **eps**: metres, 0 or more; 0 is lossless, 9e999 the coarsest.
+database: plain, GeoPackage or SpatiaLite), else it is refused. On a terrain
+in degrees longitudes count modulo 360: a region meets the terrain on every turn, and answers are in the terrain's own coordinates, never
+wrapped; a terrain that has a meridian twice answers both. Longitudes beyond 1080 are taken as they are. **eps**: metres, 0 or more; 0 is lossless, 9e999 the coarsest.
 **terrain**: a name; NULL or left out: the only one. **options**: a JSON object or NULL, after the terrain, which may be NULL:
 `rqt_range('SRID=4326;POINT(-71.3 44.27)', 10, NULL, '{"mode":"snap"}')`.
 
@@ -21,10 +23,11 @@ database: plain, GeoPackage or SpatiaLite), else it is refused. **eps**: metres,
 | `select` | `threshold`, `topdown`, `bottomup`: the same mesh three ways |
 | `strip` | `bintree`, `fan`: the same triangles. Not fan with mode cut |
 | `max_vertices` | a number of 4 or more: then eps is the least, and the mesh that of the smallest eps within that many vertices (hidden column achieved_eps). Not with mode cut |
+| `frame` | what the coordinates of a mesh are. `crs`: the terrain's x and y, and metres of height. `ecef`: metres about the Earth's centre (EPSG:4978). `enu`: metres east, north and up of the terrain's centre at height 0, whose place files tell in a comment. The last two are for terrains in longitude and latitude on WGS 84, not for mode cut, nor for the formats that hold samples. Heights are taken as above the ellipsoid when the vertical datum says so or is not known; above EGM96 they are converted by PROJ's grid egm96_15.gtx (Debian: proj-data); other datums are refused. No valid sample is further than eps from the flat triangle over it, in space: triangles are as small as the Earth's curvature asks. Both copies of a meridian, and the row of a pole, are one vertex, and the surface is closed there; where their heights differ, eps must be at least the difference |
 
 Columns called *hidden* do not show in `SELECT *`, but can be selected by name.
 
-Triangles of any two answers by cover or snap at one eps are equal or disjoint (given metric and outline).
+Triangles of any two answers by cover or snap at one eps are equal or disjoint (given metric, outline, detail and frame).
 HEAD
 sqlite3 :memory: -cmd ".load $1/rqt.so" "
 SELECT char(10) || '## ' || name || '(' || arguments || ')' || char(10) || char(10) ||

@@ -42,14 +42,6 @@ struct rqt_region {
 };
 
 /* --------------------------------------------------------------------------------------------- compile -- */
-static int64_t to_units(double v, double origin, double step) {
-    double samples = (v - origin) / step;
-    double units = samples * (double)REGION_UNIT; /* a power of two: exact, or infinite */
-    if (units >= (double)REGION_LIMIT) return REGION_LIMIT;
-    if (units <= -(double)REGION_LIMIT) return -REGION_LIMIT;
-    return (int64_t)rint(units);
-}
-
 /* What compiling one part after the other needs. */
 typedef struct compiler {
     const rqt_geometry *geometry;
@@ -62,7 +54,7 @@ typedef struct compiler {
 static region_point place_point(const compiler *c, size_t point) {
     geometry_point p = c->geometry->points[point];
     const rqt_placement *at = &c->placement;
-    return (region_point){to_units(p.x, at->x0, at->dx), to_units(p.y, at->y0, at->dy)};
+    return (region_point){region_units(p.x, at->x0, at->dx), region_units(p.y, at->y0, at->dy)};
 }
 
 /* The edges of a part's rings, from the first to before ring `end`. A lone point is an edge to itself. */

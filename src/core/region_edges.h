@@ -8,6 +8,8 @@
 
 #include "internal.h"
 
+#include <math.h>
+
 #define REGION_UNIT ((int64_t)1 << 20) /* of a sample */
 #define REGION_LIMIT ((int64_t)1 << 60)
 
@@ -22,6 +24,15 @@ typedef struct region_box { /* closed; empty when x0 > x1 */
 typedef struct region_piece { /* a closed segment; a point when both ends are equal */
     region_point a, b;
 } region_piece;
+
+/* A coordinate in units from the first sample. */
+static inline int64_t region_units(double v, double origin, double step) {
+    double samples = (v - origin) / step;
+    double units = samples * (double)REGION_UNIT; /* a power of two: exact, or infinite */
+    if (units >= (double)REGION_LIMIT) return REGION_LIMIT;
+    if (units <= -(double)REGION_LIMIT) return -REGION_LIMIT;
+    return (int64_t)rint(units);
+}
 
 static inline region_box region_piece_box(const region_piece *p) {
     bool right = p->a.x <= p->b.x, down = p->a.y <= p->b.y;

@@ -451,9 +451,20 @@ typedef struct rqt_region rqt_region;
  * RQT_UNSUPPORTED for curves and surfaces. An EMPTY geometry is valid and meets nothing. */
 rqt_status rqt_geometry_parse(const void *bytes, size_t n, bool text, const rqt_allocator *allocator,
                               rqt_geometry **geometry, rqt_message *message);
+/* Lines of counts[i] points x,y, one line after the other; a line of one point is a point. RQT_INVALID when a
+ * coordinate is not finite. */
+rqt_status rqt_geometry_of_lines(const double *xy, const size_t *counts, size_t lines, int32_t srid,
+                                 const rqt_allocator *allocator, rqt_geometry **geometry);
 void rqt_geometry_free(rqt_geometry *geometry);
 /* 0 when the geometry names none (GeoPackage's 0 and -1 count as none). */
 int32_t rqt_geometry_srid(const rqt_geometry *geometry);
+/* How many members it has; and the coordinates x,y of member n with the number of its points, if it is a line or a
+ * point: NULL when it is a polygon. */
+size_t rqt_geometry_members(const rqt_geometry *geometry);
+const double *rqt_geometry_line(const rqt_geometry *geometry, size_t n, size_t *points);
+/* Adds to every member its copies at each multiple of `period` that, added to its x, puts its box on [low, high]:
+ * longitudes are the same modulo 360. A member with coordinates beyond three periods gets none. */
+rqt_status rqt_geometry_repeat(rqt_geometry *geometry, double period, double low, double high);
 bool rqt_geometry_is_empty(const rqt_geometry *geometry);
 /* As well-known binary, x and y only: one member as what it is, several as a collection. *bytes is released with
  * allocator->resize(context, bytes, 0). */
@@ -710,6 +721,33 @@ size_t rqt_metric_bytes(const rqt_lattice *lattice, rqt_metric metric);
 rqt_status rqt_metric_compute(const rqt_grid *grid, const rqt_unit *unit, const rqt_void_cost *cost,
                               rqt_metric metric, rqt_outline outline, const rqt_allocator *allocator,
                               bool (*progress)(void *context, double done), void *context, rqt_errors *closed);
+
+/* ------------------------------------------------------------------------------------------ profiles --
+ * The heights of a mesh along lines: between two rows the mesh is a plane. */
+typedef struct rqt_profile_line {
+    const double *xy;        /* points x,y, lines one after the other */
+    const uint8_t *ends;     /* is the point the last of its line? */
+    const uint8_t *own;      /* does the point get a row? Where a line only bends to follow a curve it does not */
+    size_t points;           /* below 2^32 */
+    rqt_placement placement; /* of the samples */
+    double period;           /* 0, or: the lines count at each multiple of it, added to x, that meets the raster */
+} rqt_profile_line;
+
+typedef struct rqt_profile_row {
+    uint32_t point;     /* on the piece of the line from this point to the next */
+    int32_t turn;       /* of the period */
+    double t;           /* where on the piece, 0 .. 1 */
+    bool at_point;      /* it is the point */
+    bool after_gap;     /* somewhere between the row before and this one there is no mesh, or the line was lifted */
+    double col, row, q; /* place and height on the mesh, in samples and quanta, between integers */
+} rqt_profile_row;
+
+/* A row for every place where a line meets an edge of the patch's triangles in a point (a vertex counts once), for
+ * both ends of what of an edge it runs along, and for its own points on the patch; in the order of the lines. Which
+ * rows there are is decided exactly, with the lines' points rounded to 2^-20 sample as those of regions are; where
+ * a line crosses an edge depends on the two alone. Release rows with allocator->resize(context, rows, 0). */
+rqt_status rqt_profile_build(const rqt_patch *patch, const rqt_lattice *lattice, const rqt_profile_line *line,
+                             const rqt_allocator *allocator, rqt_profile_row **rows, size_t *count);
 
 /* --------------------------------------------------------------------------------------- mesh formats --
  * The formats of our own that stand alone (FORMAT.md, "Mesh"): 'strip' and 'indexed'. */
