@@ -34,6 +34,16 @@ static void put_coordinate(const mesh *m, uint32_t vertex, int which, sqlite3_co
     sqlite3_result_double(result, value);
 }
 
+/* A vertex as POINT Z, or the three of a triangle as POLYGON Z, in GeoPackage's bytes. */
+static void put_geometry(const mesh *m, const uint32_t *vertices, int count, sqlite3_context *result) {
+    double xyz[3][3];
+    uint8_t bytes[FORMAT_TRIANGLE_BYTES];
+    for (int i = 0; i < count; i++) format_coordinates(&m->frame, &m->patch.vertices[vertices[i]], xyz[i]);
+    const size_t size = count == 1 ? format_point_gpkg(xyz[0], m->frame.srid, bytes)
+                                   : format_triangle_gpkg((const double(*)[3])xyz, m->frame.srid, bytes);
+    sqlite3_result_blob(result, bytes, (int)size, SQLITE_TRANSIENT);
+}
+
 /* The mesh of the arguments, not yet as rows. */
 static int make_mesh(connection *c, sqlite3_value **arguments, rqt_product product, row_set *rows, mesh **out,
                      char **error) {
@@ -44,7 +54,8 @@ static int make_mesh(connection *c, sqlite3_value **arguments, rqt_product produ
     code = m ? SQLITE_OK : SQLITE_NOMEM;
     if (m) {
         memset(m, 0, sizeof *m);
-        m->frame = (format_frame){.placement = r.terrain->placement, .unit = r.terrain->unit, .eps = r.eps};
+        m->frame =
+            (format_frame){.placement = r.terrain->placement, .unit = r.terrain->unit, .srid = r.terrain->srid};
         m->factor = rqt_unit_factor(&m->frame.unit);
         m->store = r.store;
         code = request_patch(&r, product, &m->patch, NULL, error);
@@ -73,6 +84,8 @@ static void range_column(void *data, size_t row, int column, sqlite3_context *re
         sqlite3_result_int(result, v->level);
     else if (column == 8)
         sqlite3_result_double(result, m->achieved_eps);
+    else if (column == 9)
+        put_geometry(m, &(const uint32_t){(uint32_t)row}, 1, result);
     else
         sqlite3_result_int(result, column == 5 ? v->col : column == 6 ? v->row : v->q);
 }
@@ -92,6 +105,8 @@ static void triangles_column(void *data, size_t row, int column, sqlite3_context
         sqlite3_result_int64(result, (sqlite3_int64)row + 1);
     else if (column == 10)
         sqlite3_result_double(result, m->achieved_eps);
+    else if (column == 11)
+        put_geometry(m, &m->patch.triangles[3 * row], 3, result);
     else
         put_coordinate(m, m->patch.triangles[3 * row + (size_t)(column - 1) / 3], (column - 1) % 3, result);
 }

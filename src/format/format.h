@@ -38,10 +38,12 @@ int format_double(double value, char text[32]);
 rqt_status format_patch(const rqt_patch *patch, const format_frame *frame, format_kind kind,
                         const rqt_allocator *allocator, uint8_t **bytes, size_t *size);
 
-/* A closed triangle as a GeoPackage POLYGON Z, for layers with a row per triangle: writes 8 + 32 + 93 + ... bytes;
- * returns the size, at most FORMAT_TRIANGLE_BYTES. */
+/* A triangle as a GeoPackage POLYGON Z, with an xy envelope, and a point as a GeoPackage POINT Z: for rows with a
+ * geometry each. They return the size, at most FORMAT_TRIANGLE_BYTES and FORMAT_POINT_BYTES. */
 #define FORMAT_TRIANGLE_BYTES 160
+#define FORMAT_POINT_BYTES 40
 size_t format_triangle_gpkg(const double xyz[3][3], int32_t srid, uint8_t bytes[FORMAT_TRIANGLE_BYTES]);
+size_t format_point_gpkg(const double xyz[3], int32_t srid, uint8_t bytes[FORMAT_POINT_BYTES]);
 
 /* A polygon of one ring (n points x,y, not closed) as a GeoPackage geometry with an xy envelope: what rqt_bbox and
  * rqt_circle return. */
