@@ -304,6 +304,27 @@ static void test_spatialite_reads_it(void **state) {
     assert_int_equal(sqlite3_close(db), SQLITE_OK);
 }
 
+static void test_point_gpkg(void **state) {
+    (void)state;
+    for (int round = 0; round < 50; round++) {
+        const double xyz[3] = {random_between(-1000000, 1000000) / 7.0, random_between(-1000000, 1000000) / 7.0,
+                               random_between(-1000000, 1000000) / 7.0};
+        const int32_t srid = round % 2 ? 2056 : 0;
+        uint8_t bytes[FORMAT_POINT_BYTES + 8];
+        memset(bytes, 0xA5, sizeof bytes);
+        const size_t size = format_point_gpkg(xyz, srid, bytes);
+        assert_true(size <= FORMAT_POINT_BYTES);
+        for (size_t i = size; i < sizeof bytes; i++) assert_int_equal(bytes[i], 0xA5);
+        reader r = {bytes, bytes + size};
+        assert_memory_equal(take(&r, 4), "GP\0\1", 4);
+        assert_int_equal((int32_t)take_u32(&r), srid ? srid : -1);
+        assert_int_equal(take_byte(&r), 1);
+        assert_int_equal(take_u32(&r), 1001);
+        for (int i = 0; i < 3; i++) assert_true(take_double(&r) == xyz[i]);
+        assert_ptr_equal(r.p, r.end);
+    }
+}
+
 static void test_triangle_gpkg(void **state) {
     (void)state;
     for (int round = 0; round < 200; round++) {
@@ -499,6 +520,7 @@ int main(void) {
         cmocka_unit_test_setup(test_ogr_reads_it, begin),
         cmocka_unit_test_setup(test_spatialite_reads_it, begin),
         cmocka_unit_test_setup(test_triangle_gpkg, begin),
+        cmocka_unit_test_setup(test_point_gpkg, begin),
         cmocka_unit_test_setup(test_ring_gpkg, begin),
         cmocka_unit_test_setup(test_too_large, begin),
         cmocka_unit_test_setup(test_obj_too_large, begin),

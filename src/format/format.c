@@ -165,6 +165,11 @@ enum { PLY_VERTEX = 24, PLY_FACE = 1 + 12 };
 static void add_ply_header(sink *s, const rqt_patch *patch, const format_frame *frame) {
     add_text(s, "ply\nformat binary_little_endian 1.0\n");
     add_comments(s, frame, "comment ");
+    if (frame->srid > 0) { /* as QGIS (MDAL) reads it */
+        add_text(s, "comment crs: EPSG:");
+        add_count(s, (uint64_t)frame->srid);
+        add_text(s, "\n");
+    }
     add_text(s, "element vertex ");
     add_count(s, patch->vertex_count);
     add_text(s, "\nproperty double x\nproperty double y\nproperty double z\nelement face ");
