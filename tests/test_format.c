@@ -505,14 +505,55 @@ static void test_unsound_patches(void **state) {
             size_t size;
             assert_int_equal(format_patch(&s.patch, &s.frame, kinds[k], &s.allocator, &bytes, &size), RQT_INVALID);
             assert_null(bytes);
-            assert_int_equal(s.heap.asked, 0);
+            assert_int_equal(s.heap.held, 0);
             patch_end(&s);
         }
+}
+
+/* A mesh between samples, far from any raster: the same bytes as the patch has, with other coordinates. */
+static void between_samples(const void *context, size_t vertex, double xyz[3]) {
+    for (int i = 0; i < 3; i++) xyz[i] = ((const double *)context)[3 * vertex + (size_t)i];
+}
+
+static void test_meshes_between_samples(void **state) {
+    (void)state;
+    const double xyz[12] = {0.1, 1.0 / 3, -2e-7, 6378137.5, -0.25, 1e-300, 2.75, 4e6, 0.5, NAN, NAN, NAN};
+    const uint32_t triangle[3] = {0, 1, 2}, hole[3] = {0, 1, 3};
+    heap h = {0};
+    const rqt_allocator a = {heap_resize, &h};
+    for (int k = 0; k < KINDS; k++) {
+        format_mesh mesh = {.vertex_count = 3,
+                            .triangle_count = 1,
+                            .triangles = triangle,
+                            .coordinates = between_samples,
+                            .context = xyz,
+                            .srid = 4978,
+                            .eps = 1};
+        uint8_t *bytes;
+        size_t size;
+        assert_int_equal(format_write(&mesh, kinds[k], &a, &bytes, &size), RQT_OK);
+        /* all nine numbers are there, as text or as the bits of a double */
+        for (int i = 0; i < 9; i++) {
+            char text[34] = " ";
+            const int n = kinds[k] == FORMAT_OBJ ? 1 + format_double(xyz[i], text + 1) : 8;
+            const void *wanted = kinds[k] == FORMAT_OBJ ? (const void *)text : &xyz[i];
+            bool found = false;
+            for (size_t at = 0; at + (size_t)n <= size; at++) found |= memcmp(bytes + at, wanted, (size_t)n) == 0;
+            assert_true(found);
+        }
+        heap_resize(&h, bytes, 0);
+        mesh.vertex_count = 4;
+        mesh.triangles = hole;
+        assert_int_equal(format_write(&mesh, kinds[k], &a, &bytes, &size), RQT_INVALID);
+        assert_null(bytes);
+        assert_int_equal(h.held, 0);
+    }
 }
 
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(test_names, begin),
+        cmocka_unit_test_setup(test_meshes_between_samples, begin),
         cmocka_unit_test_setup(test_formats_read_back, begin),
         cmocka_unit_test_setup(test_placements, begin),
         cmocka_unit_test_setup(test_box_is_of_the_triangles, begin),

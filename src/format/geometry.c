@@ -90,28 +90,6 @@ static uint8_t *put_spatialite_head(uint8_t *p, int32_t srid, const format_box *
     return put_byte(p, 0x7C);
 }
 
-void geometry_write(format_kind kind, const rqt_patch *patch, const format_frame *frame, const format_box *box,
-                    uint8_t *bytes) {
-    bool spatialite = kind == FORMAT_SPATIALITE;
-    uint8_t *p = bytes;
-    if (patch->triangle_count == 0) box = NULL;
-    if (spatialite)
-        p = put_spatialite_head(p, frame->srid, box);
-    else {
-        if (kind == FORMAT_GPKG) p = put_gpkg_head(p, box ? GPKG_BOXED : GPKG_EMPTY, frame->srid, box);
-        p = put_byte(p, 1);
-    }
-    p = put_u32(p, MULTIPOLYGON_Z);
-    p = put_u32(p, (uint32_t)patch->triangle_count);
-    for (size_t t = 0; t < patch->triangle_count; t++) {
-        double xyz[3][3];
-        for (int i = 0; i < 3; i++)
-            format_coordinates(frame, &patch->vertices[patch->triangles[3 * t + (size_t)i]], xyz[i]);
-        p = put_triangle(p, spatialite ? 0x69 : 1, xyz);
-    }
-    if (spatialite) (void)put_byte(p, 0xFE);
-}
-
 static void box_begin(format_box *box, double x, double y) {
     box->min_x = box->max_x = x;
     box->min_y = box->max_y = y;
@@ -122,6 +100,34 @@ static void box_add(format_box *box, double x, double y) {
     if (x > box->max_x) box->max_x = x;
     if (y < box->min_y) box->min_y = y;
     if (y > box->max_y) box->max_y = y;
+}
+
+/* The triangles come first, behind room for the head, which needs their box. */
+bool geometry_write(format_kind kind, const format_mesh *mesh, uint8_t *bytes) {
+    const bool spatialite = kind == FORMAT_SPATIALITE;
+    const size_t count = mesh->triangle_count;
+    uint8_t *p = bytes + geometry_size(kind, count) - TRIANGLE * count - (spatialite ? 1 : 0);
+    format_box box = {0, 0, 0, 0};
+    for (size_t t = 0; t < count; t++) {
+        double xyz[3][3];
+        for (size_t i = 0; i < 3; i++) {
+            if (!mesh_coordinates(mesh, mesh->triangles[3 * t + i], xyz[i])) return false;
+            if (t == 0 && i == 0) box_begin(&box, xyz[i][0], xyz[i][1]);
+            box_add(&box, xyz[i][0], xyz[i][1]);
+        }
+        p = put_triangle(p, spatialite ? 0x69 : 1, xyz);
+    }
+    if (spatialite) (void)put_byte(p, 0xFE);
+    p = bytes;
+    if (spatialite)
+        p = put_spatialite_head(p, mesh->srid, count ? &box : NULL);
+    else {
+        if (kind == FORMAT_GPKG) p = put_gpkg_head(p, count ? GPKG_BOXED : GPKG_EMPTY, mesh->srid, &box);
+        p = put_byte(p, 1);
+    }
+    p = put_u32(p, MULTIPOLYGON_Z);
+    (void)put_u32(p, (uint32_t)count);
+    return true;
 }
 
 size_t format_triangle_gpkg(const double xyz[3][3], int32_t srid, uint8_t bytes[FORMAT_TRIANGLE_BYTES]) {
