@@ -80,8 +80,8 @@ int request_read(connection *c, sqlite3_value *region, sqlite3_value *eps, sqlit
                  sqlite3_value *options, request *out, char **error);
 /* A patch with what the product needs; of strips, the one that the options want. Give it back with store_keep. */
 int request_patch(request *r, rqt_product product, rqt_patch *patch, store_reads *reads, char **error);
-/* The patch in wire format. delta.c */
-int wire_mesh(request *r, uint8_t **bytes, size_t *size, char **error);
+/* The patch in wire format, with normals or without. delta.c */
+int wire_mesh(request *r, bool normals, uint8_t **bytes, size_t *size, char **error);
 void request_free(request *r);
 /* The terrain that a value names; NULL value: the only one. */
 int request_terrain(store *s, sqlite3_value *name, const store_terrain **terrain, char **error);
