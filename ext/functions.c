@@ -73,7 +73,8 @@ const function rqt_functions[] = {
      .arguments = "region, eps, format [, terrain [, options]]",
      .returns = "BLOB, TEXT for obj",
      .purpose = "The mesh of a region as a file's bytes; format: strip, indexed, rqt (src/core/FORMAT.md; rqt "
-                "takes about a byte a vertex), obj, ply, wkb, gpkg, spatialite.",
+                "takes about a byte a vertex), obj, ply, wkb, gpkg, spatialite; ply+normals, rqt+normals: with the "
+                "terrain's normal at every vertex, from the full-resolution samples around it.",
      .example = "SELECT length(rqt_mesh(" SUMMIT ", 10, 'ply'))",
      .call = call_mesh,
      .least = 3,

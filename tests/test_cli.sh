@@ -203,6 +203,7 @@ refuses "mesh: no ending" 2 "the file ends in" $M --eps 1 -o .obj
 refuses "mesh: --mode cut is for later" 2 "--mode cut is not in this version" $M --eps 1 --mode cut -o a.obj
 refuses "mesh: an unknown mode" 2 "there is no such mode" $M --eps 1 --mode x -o a.obj
 refuses "mesh: a list of eps for a model" 2 "--eps takes one number" $M --eps 1,2 -o a.obj
+refuses "mesh: normals in a file that holds none" 2 "a.obj holds no normals; a .ply does" $M --eps 1 --normals -o a.obj
 refuses "mesh: too narrow" 2 "--width 100" $M --eps 1 --width 100 -o a.png
 refuses "mesh: the database itself" 2 "is the database itself" $M --eps 1 -o ./t.gpkg
 ln -s t.gpkg link.gpkg
@@ -246,6 +247,9 @@ ok "gpkg of nothing is an empty layer" $? "$(cat err)"
 rqt $M --eps 2 --mode cover -o x.obj; cp x.obj first.obj; echo old >x.obj
 rqt $M --eps 2 -o x.obj; cmp -s x.obj first.obj; ok "mesh replaces a file, and gives the same bytes again" $?
 rqt $M --eps 2 -o X.OBJ; [ $status = 0 ] && cmp -s X.OBJ first.obj; ok "mesh: endings in capitals" $?
+rqt $M --eps 2 --normals -o n.ply
+sqlite3 t.gpkg -cmd ".load $RQT_SO" "SELECT writefile('sql.ply', rqt_mesh(NULL, 2, 'ply+normals', 'hill'))" >/dev/null 2>&1
+[ -s n.ply ] && cmp -s n.ply sql.ply && grep -aq 'property float nz' n.ply; ok "mesh --normals: SQL's bytes, with normals" $? "$(cat err)"
 if command -v gdal_translate >/dev/null; then
     gdal_translate -q -a_srs EPSG:32633 hill.asc utm.tif 2>/dev/null
     rqt import utm.tif utm.gpkg
