@@ -16,7 +16,7 @@ INCLUDES = -Isrc/core -Isrc/store -Isrc/geo -Isrc/verify -Isrc/format -Isrc/impo
 
 CORE = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/core/*.c))
 PLAIN = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/verify/*.c src/format/*.c))
-GEO = $(BUILD)/geo/geo.o
+GEO = $(patsubst src/%.cpp,$(BUILD)/%.o,$(wildcard src/geo/*.cpp))
 SQL_SOURCES = $(wildcard src/store/*.c ext/*.c)
 SQL_HOSTED = $(patsubst %.c,$(BUILD)/hosted/%.o,$(SQL_SOURCES))
 SQL_LINKED = $(patsubst %.c,$(BUILD)/linked/%.o,$(SQL_SOURCES))
@@ -25,7 +25,7 @@ CLI = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/cli/*.c))
 GENERATED = $(BUILD)/generated/schema_sql.h
 
 LIBS_CORE = -lzstd -lm
-LIBS_EXT = -lGeographicLib -lcjson $(LIBS_CORE)
+LIBS_EXT = -lGeographicLib -lgeos_c -lproj -lcjson $(LIBS_CORE)
 LIBS_CLI = $(LIBS_EXT) -lsqlite3 $(shell gdal-config --libs 2>/dev/null) $(shell pkg-config --libs cairo libpng 2>/dev/null) -lpthread -lstdc++
 GDAL_CFLAGS = $(shell gdal-config --cflags 2>/dev/null)
 CAIRO_CFLAGS = $(shell pkg-config --cflags cairo libpng 2>/dev/null)

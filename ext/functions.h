@@ -71,9 +71,13 @@ typedef struct request {
     rqt_region *region;
     double eps;
     store_query_options options;
-    bool fans;            /* the strip goes round the centres of blocks */
-    int64_t max_vertices; /* 0: any number */
-    double achieved_eps;  /* of the mesh: eps, or more to keep within max_vertices; known after request_patch */
+    bool border;           /* mode border */
+    bool whole;            /* the options name a mode of whole triangles */
+    struct cJSON *detail;  /* the option, as it came; NULL: none */
+    struct places *places; /* what it says; detail.c */
+    bool fans;             /* the strip goes round the centres of blocks */
+    int64_t max_vertices;  /* 0: any number */
+    double achieved_eps;   /* of the mesh: eps, or more to keep within max_vertices; known after request_patch */
 } request;
 
 int request_read(connection *c, sqlite3_value *region, sqlite3_value *eps, sqlite3_value *terrain,
@@ -83,10 +87,35 @@ int request_patch(request *r, rqt_product product, rqt_patch *patch, store_reads
 /* The patch in wire format, with normals or without. delta.c */
 int wire_mesh(request *r, bool normals, uint8_t **bytes, size_t *size, char **error);
 void request_free(request *r);
+/* A geometry, n bytes of text or BLOB, in the coordinates of the terrain; `what` it is, for sentences. */
+int request_geometry(const request *r, const void *bytes, size_t n, bool text, const char *what,
+                     rqt_geometry **geometry, char **error);
+/* The same as a region. */
+int request_region(const request *r, const rqt_geometry *geometry, const char *what, rqt_region **region,
+                   char **error);
+/* The rule of what the options detail and mode want, when terrain and region are known. detail.c */
+int rule_read(request *r, char **error);
+void rule_free(request *r);
 /* The terrain that a value names; NULL value: the only one. */
 int request_terrain(store *s, sqlite3_value *name, const store_terrain **terrain, char **error);
 /* "what must be a number ...": false and a sentence when the value is none, or NaN. */
 bool request_number(sqlite3_value *value, const char *what, double *number, char **error);
+/* The lines of a geometry (points are lines of one point), for functions that want a line: line i has counts[i]
+ * points of x,y, one line after the other. SQLITE_ERROR for NULL, an empty geometry and polygons. */
+typedef struct line_set {
+    double *xy;
+    size_t *counts;
+    size_t count, points;
+    int32_t srid;
+} line_set;
+int lines_read(sqlite3_value *value, line_set *lines, char **error); /* lines.c */
+void lines_free(line_set *lines);
+/* Is it in the terrain's CRS? */
+int request_place(int32_t srid, const char *what, const store_terrain *t, char **error);
+/* Metres in a unit of a terrain's x and y, where they are no angles; 1 when its CRS does not say. */
+double terrain_metre(const store_terrain *t);
+/* Longitudes are the same modulo 360: add the copies that meet the terrain, if it is in degrees. */
+int request_turn(rqt_geometry *geometry, const store_terrain *t);
 /* Options of the contract; sentences name what is unknown and what is not in this version. options.c */
 int options_read(const char *json, request *r, char **error);
 
@@ -95,9 +124,11 @@ int fail(char **error, const char *format, ...);
 
 /* The functions themselves, by file. */
 fill_rows fill_range, fill_triangles, fill_strip;                          /* mesh_tables.c */
+fill_rows fill_profile, fill_area;                                         /* profile.c, area.c */
 fill_rows fill_terrains, fill_explain, fill_verify, fill_check, fill_help; /* insight_tables.c, verify_table.c */
-scalar_call call_version, call_build_info, call_bbox, call_circle, call_mesh, call_height; /* scalar.c */
-scalar_call call_block_info, call_block_check, call_block_dump;                            /* block_functions.c */
-scalar_call call_delta;                                                                    /* delta.c */
+scalar_call call_version, call_build_info, call_mesh, call_height;         /* scalar.c */
+scalar_call call_block_info, call_block_check, call_block_dump;            /* block_functions.c */
+scalar_call call_bbox, call_circle, call_corridor;                         /* shapes.c */
+scalar_call call_delta;                                                    /* delta.c */
 
 #endif

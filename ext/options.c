@@ -8,17 +8,17 @@
 
 typedef struct choice {
     const char *key;
-    const char *done;    /* values that work, between blanks; "#": an integer of 4 or more */
+    const char *done; /* values that work, between blanks; "#": an integer of 4 or more; "[": detail.c reads it */
     const char *pending; /* values of the contract that are not in this version; "*": any value */
 } choice;
 
 static const choice choices[] = {
-    {"mode", " cover ", " snap border cut "},
+    {"mode", " cover border ", " snap cut "},
     {"outline", " exact ", " tol "},
     {"metric", " exact minimal local wedgie euclid ", ""},
     {"select", " threshold topdown bottomup ", ""},
     {"strip", " bintree fan ", ""},
-    {"detail", "", "*"},
+    {"detail", "[", ""},
     {"max_vertices", "#", ""},
     {"max_triangles", "", "*"},
     {"previous", "", "*"},
@@ -55,6 +55,10 @@ static int read_one(const cJSON *item, request *r, char **error) {
         r->max_vertices = (int64_t)n;
         return SQLITE_OK;
     }
+    if (c->done[0] == '[') {
+        r->detail = cJSON_Duplicate(item, true);
+        return r->detail ? SQLITE_OK : SQLITE_NOMEM;
+    }
     if (!cJSON_IsString(item))
         return fail(error, "option \"%s\" must be a text: one of%.*s", c->key, (int)strlen(c->done) - 1, c->done);
     const char *value = item->valuestring;
@@ -65,6 +69,10 @@ static int read_one(const cJSON *item, request *r, char **error) {
     /* The lists above are in the order of the enumerations. */
     if (strcmp(c->key, "select") == 0) r->options.select = (rqt_select)index_of(c, value);
     if (strcmp(c->key, "metric") == 0) r->options.metric = (rqt_metric)index_of(c, value);
+    if (strcmp(c->key, "mode") == 0) {
+        r->border = strcmp(value, "border") == 0;
+        r->whole = strcmp(value, "cut") != 0;
+    }
     if (strcmp(c->key, "strip") == 0) r->fans = strcmp(value, "fan") == 0;
     return SQLITE_OK;
 }

@@ -26,8 +26,41 @@ int request_terrain(store *s, sqlite3_value *name, const store_terrain **terrain
     return store_find(s, text, terrain, error);
 }
 
+int request_place(int32_t srid, const char *what, const store_terrain *t, char **error) {
+    if (srid == 0 || srid == t->srid || (srid == 4326 && t->wgs84)) return SQLITE_OK;
+    return fail(error, "%s has SRID %d, terrain %s has SRID %d; transforming between them is not in this version",
+                what, srid, t->name, t->srid);
+}
+
+int request_turn(rqt_geometry *geometry, const store_terrain *t) {
+    if (!t->lonlat) return SQLITE_OK;
+    const double first = t->placement.x0, last = first + (t->lattice.width - 1) * t->placement.dx;
+    const rqt_status status = rqt_geometry_repeat(geometry, 360, fmin(first, last), fmax(first, last));
+    return status == RQT_OK ? SQLITE_OK : SQLITE_NOMEM;
+}
+
+int request_geometry(const request *r, const void *bytes, size_t n, bool text, const char *what,
+                     rqt_geometry **geometry, char **error) {
+    rqt_message why = {""};
+    const rqt_status status = rqt_geometry_parse(bytes ? bytes : "", n, text, store_allocator(), geometry, &why);
+    if (status == RQT_NO_MEMORY) return SQLITE_NOMEM;
+    if (status != RQT_OK) return fail(error, "%s: %s", what, why.text);
+    const int code = request_place(rqt_geometry_srid(*geometry), what, r->terrain, error);
+    return code == SQLITE_OK ? request_turn(*geometry, r->terrain) : code;
+}
+
+int request_region(const request *r, const rqt_geometry *geometry, const char *what, rqt_region **region,
+                   char **error) {
+    const rqt_status status =
+        rqt_region_create(geometry, &r->terrain->placement, &r->terrain->lattice, store_allocator(), region);
+    if (status == RQT_OK) return SQLITE_OK;
+    return status == RQT_NO_MEMORY ? SQLITE_NOMEM
+                                   : fail(error, "%s cannot be placed on terrain %s", what, r->terrain->name);
+}
+
 static int read_region(request *r, sqlite3_value *value, char **error) {
     const int type = value ? sqlite3_value_type(value) : SQLITE_NULL;
+    int code = SQLITE_OK;
     if (type == SQLITE_INTEGER || type == SQLITE_FLOAT)
         return fail(error, "region must be WKT text, a geometry or NULL; it is a number");
     if (type != SQLITE_NULL) {
@@ -35,24 +68,9 @@ static int read_region(request *r, sqlite3_value *value, char **error) {
             type == SQLITE_TEXT ? (const void *)sqlite3_value_text(value) : sqlite3_value_blob(value);
         const size_t n = (size_t)sqlite3_value_bytes(value);
         if (!bytes && n > 0) return SQLITE_NOMEM;
-        rqt_message why = {""};
-        const rqt_status status =
-            rqt_geometry_parse(bytes ? bytes : "", n, type == SQLITE_TEXT, store_allocator(), &r->geometry, &why);
-        if (status == RQT_NO_MEMORY) return SQLITE_NOMEM;
-        if (status != RQT_OK) return fail(error, "region: %s", why.text);
-        const int32_t srid = rqt_geometry_srid(r->geometry);
-        const store_terrain *t = r->terrain;
-        if (srid != 0 && srid != t->srid && !(srid == 4326 && t->wgs84))
-            return fail(
-                error,
-                "region has SRID %d, terrain %s has SRID %d; transforming between them is not in this version",
-                srid, t->name, t->srid);
+        code = request_geometry(r, bytes, n, type == SQLITE_TEXT, "region", &r->geometry, error);
     }
-    const rqt_status status =
-        rqt_region_create(r->geometry, &r->terrain->placement, &r->terrain->lattice, store_allocator(), &r->region);
-    if (status == RQT_OK) return SQLITE_OK;
-    return status == RQT_NO_MEMORY ? SQLITE_NOMEM
-                                   : fail(error, "region cannot be placed on terrain %s", r->terrain->name);
+    return code == SQLITE_OK ? request_region(r, r->geometry, "region", &r->region, error) : code;
 }
 
 int request_read(connection *c, sqlite3_value *region, sqlite3_value *eps, sqlite3_value *terrain,
@@ -71,6 +89,7 @@ int request_read(connection *c, sqlite3_value *region, sqlite3_value *eps, sqlit
     if (code == SQLITE_OK) r->connection = c;
     if (code == SQLITE_OK) code = request_terrain(r->store, terrain, &r->terrain, error);
     if (code == SQLITE_OK) code = read_region(r, region, error);
+    if (code == SQLITE_OK) code = rule_read(r, error);
     if (code != SQLITE_OK) request_free(r);
     return code;
 }
@@ -90,6 +109,7 @@ int request_patch(request *r, rqt_product product, rqt_patch *patch, store_reads
 }
 
 void request_free(request *r) {
+    rule_free(r);
     rqt_region_free(r->region);
     rqt_geometry_free(r->geometry);
     if (r->connection) connection_done(r->connection);

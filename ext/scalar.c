@@ -49,61 +49,6 @@ void call_build_info(sqlite3_context *result, int count, sqlite3_value **argumen
         sqlite3_result_error_nomem(result);
 }
 
-static void result_ring(sqlite3_context *result, const double *xy, int n, int32_t srid) {
-    uint8_t *bytes = NULL;
-    size_t size = 0;
-    if (format_ring_gpkg(xy, n, srid, store_allocator(), &bytes, &size) == RQT_OK)
-        sqlite3_result_blob64(result, bytes, size, sqlite3_free);
-    else
-        sqlite3_result_error_nomem(result);
-}
-
-void call_bbox(sqlite3_context *result, int count, sqlite3_value **arguments) {
-    static const char *const names[] = {"x0", "y0", "x1", "y1", "srid"};
-    double v[5] = {0};
-    char *error = NULL;
-    for (int i = 0; i < count; i++) {
-        if (i == 4 && sqlite3_value_type(arguments[4]) == SQLITE_NULL) continue;
-        if (!request_number(arguments[i], names[i], &v[i], &error) || !isfinite(v[i])) {
-            if (!error) (void)fail(&error, "%s must be finite", names[i]);
-            scalar_error(result, "rqt_bbox", SQLITE_ERROR, error);
-            return;
-        }
-    }
-    if (v[0] > v[2] || v[1] > v[3])
-        (void)fail(&error, "%s is greater than %s: give the lesser corner first", v[0] > v[2] ? "x0" : "y0",
-                   v[0] > v[2] ? "x1" : "y1");
-    else if (v[4] != floor(v[4]) || fabs(v[4]) > INT32_MAX)
-        (void)fail(&error, "srid must be an integer");
-    if (error) {
-        scalar_error(result, "rqt_bbox", SQLITE_ERROR, error);
-        return;
-    }
-    const double ring[8] = {v[0], v[1], v[2], v[1], v[2], v[3], v[0], v[3]};
-    result_ring(result, ring, 4, (int32_t)v[4]);
-}
-
-#define CIRCLE_POINTS 256 /* the polygon's sides sag by 0.0075 % of the radius */
-
-void call_circle(sqlite3_context *result, int count, sqlite3_value **arguments) {
-    static const char *const names[] = {"lon", "lat", "metres"};
-    double v[3];
-    char *error = NULL;
-    for (int i = 0; i < count; i++)
-        if (!request_number(arguments[i], names[i], &v[i], &error)) {
-            scalar_error(result, "rqt_circle", SQLITE_ERROR, error);
-            return;
-        }
-    double ring[2 * CIRCLE_POINTS];
-    char why[256] = "";
-    if (geo_circle(v[0], v[1], v[2], CIRCLE_POINTS, ring, why, sizeof why) == 0) {
-        result_ring(result, ring, CIRCLE_POINTS, 4326);
-        return;
-    }
-    const int code = fail(&error, "%s", why);
-    scalar_error(result, "rqt_circle", code, error);
-}
-
 /* -------------------------------------------------------------------------------------------- rqt_mesh */
 
 static int own_format(const request *r, const rqt_patch *patch, rqt_mesh_kind kind, uint8_t **bytes, size_t *size,

@@ -8,8 +8,8 @@ set -eu
 packages_for() {
     case $1 in
     build) echo gcc g++ libc6-dev make pkg-config sqlite3 libsqlite3-dev libzstd-dev libgdal-dev libgeographiclib-dev \
-        libcjson-dev libcairo2-dev libpng-dev fonts-dejavu-core gnuplot-nox ;;
-    test) echo libcmocka-dev libgmp-dev libproj-dev gdal-bin libsqlite3-mod-spatialite python3 unzip binutils git ;;
+        libgeos-dev libproj-dev proj-data libcjson-dev libcairo2-dev libpng-dev fonts-dejavu-core gnuplot-nox ;;
+    test) echo libcmocka-dev libgmp-dev gdal-bin libsqlite3-mod-spatialite python3 unzip binutils git ;;
     format) echo clang-format ;;
     qgis) echo python3-qgis ;;
     peers) command -v node >/dev/null 2>&1 && command -v npm >/dev/null 2>&1 || echo nodejs npm ;;

@@ -25,8 +25,9 @@ static const char HELP[] =
     "  --region R      x0,y0,x1,y1 or WKT, in the terrain's coordinates (default: all)\n"
     "  --terrain T     which terrain (default: the only one)\n"
     "  --normals       with the terrain's normal at each vertex, from its full-resolution samples; for .ply\n"
-    "  --mode M        what happens at the region's border; in this version only cover, the default: every\n"
-    "                  triangle that has a part of its inside in the region, whole\n"
+    "  --mode M        what happens at the region's border: cover, the default: every triangle that has a part\n"
+    "                  of its inside in the region, whole; border: smaller triangles along it, so that the mesh\n"
+    "                  ends there, at half cells of the samples (a rectangle grows outward to whole samples)\n"
     "  -o, --output F  the file; it is replaced when it exists, and only by a whole one\n"
     "  --width W       width of a picture in pixels, 1200 to 12000 (default 1800)\n"
     "  --help          this text\n"
@@ -77,13 +78,16 @@ static kind kind_of(const char *path) {
 }
 
 static int set_mode(const char *mode, request *r) {
-    if (!strcmp(mode, "cover")) {
-        r->options = "{\"mode\":\"cover\"}";
-        return CLI_OK;
-    }
-    if (!strcmp(mode, "snap") || !strcmp(mode, "border") || !strcmp(mode, "cut"))
-        return cli_usage("--mode %s is not in this version", mode);
-    return cli_usage("--mode %s: there is no such mode; this version has cover", mode);
+    static const struct {
+        const char *mode, *options;
+    } modes[] = {{"cover", "{\"mode\":\"cover\"}"}, {"border", "{\"mode\":\"border\"}"}};
+    for (size_t i = 0; i < sizeof modes / sizeof *modes; i++)
+        if (!strcmp(mode, modes[i].mode)) {
+            r->options = modes[i].options;
+            return CLI_OK;
+        }
+    if (!strcmp(mode, "snap") || !strcmp(mode, "cut")) return cli_usage("--mode %s is not in this version", mode);
+    return cli_usage("--mode %s: there is no such mode; this version has cover and border", mode);
 }
 
 /* The bytes of SQL's rqt_mesh. */

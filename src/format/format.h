@@ -64,8 +64,12 @@ rqt_status format_patch(const rqt_patch *patch, const format_frame *frame, forma
 size_t format_triangle_gpkg(const double xyz[3][3], int32_t srid, uint8_t bytes[FORMAT_TRIANGLE_BYTES]);
 size_t format_point_gpkg(const double xyz[3], int32_t srid, uint8_t bytes[FORMAT_POINT_BYTES]);
 
-/* A polygon of one ring (n points x,y, not closed) as a GeoPackage geometry with an xy envelope: what rqt_bbox and
- * rqt_circle return. */
+/* Polygons as a GeoPackage geometry with an xy envelope, a POLYGON or a MULTIPOLYGON: rings one after the other in
+ * xy (two doubles a point, not closed), one with ring_is_shell begins a polygon. What rqt_corridor returns. */
+rqt_status format_polygons_gpkg(const double *xy, const size_t *ring_points, const unsigned char *ring_is_shell,
+                                size_t rings, int32_t srid, const rqt_allocator *allocator, uint8_t **bytes,
+                                size_t *size);
+/* The same of one ring. */
 rqt_status format_ring_gpkg(const double *xy, int n, int32_t srid, const rqt_allocator *allocator, uint8_t **bytes,
                             size_t *size);
 

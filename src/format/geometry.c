@@ -23,7 +23,7 @@
 
 #include <math.h>
 
-enum { POLYGON = 3, POINT_Z = 1001, POLYGON_Z = 1003, MULTIPOLYGON_Z = 1006 };
+enum { POLYGON = 3, MULTIPOLYGON = 6, POINT_Z = 1001, POLYGON_Z = 1003, MULTIPOLYGON_Z = 1006 };
 enum {
     WKB_HEAD = 9,       /* byte order, type, count */
     TRIANGLE = 13 + 96, /* head, ring count, point count; four points */
@@ -144,34 +144,64 @@ size_t format_point_gpkg(const double xyz[3], int32_t srid, uint8_t bytes[FORMAT
     return (size_t)(put_xyz(p, xyz) - bytes);
 }
 
-rqt_status format_ring_gpkg(const double *xy, int n, int32_t srid, const rqt_allocator *allocator, uint8_t **bytes,
-                            size_t *size) {
+rqt_status format_polygons_gpkg(const double *xy, const size_t *ring_points, const unsigned char *ring_is_shell,
+                                size_t rings, int32_t srid, const rqt_allocator *allocator, uint8_t **bytes,
+                                size_t *size) {
     *bytes = NULL;
     *size = 0;
-    if (n < 3) return RQT_INVALID;
-    uint64_t total = GPKG_HEAD + ENVELOPE + WKB_HEAD + 4 + 16 * ((uint64_t)n + 1);
+    uint64_t polygons = 0, total = GPKG_HEAD + ENVELOPE;
+    if (rings < 1 || !ring_is_shell[0]) return RQT_INVALID;
+    for (size_t r = 0; r < rings; r++) {
+        if (ring_points[r] < 3 || ring_points[r] > FORMAT_LIMIT) return RQT_INVALID;
+        if (ring_is_shell[r]) polygons++;
+        total += (uint64_t)(ring_is_shell[r] ? WKB_HEAD + 4 : 4) + 16 * ((uint64_t)ring_points[r] + 1);
+        if (total > FORMAT_LIMIT) return RQT_INVALID;
+    }
+    if (polygons > 1) total += (uint64_t)WKB_HEAD;
     if (total > FORMAT_LIMIT) return RQT_INVALID;
 
     format_box box;
     box_begin(&box, xy[0], xy[1]);
-    for (size_t i = 0; i < (size_t)n; i++) {
-        if (!isfinite(xy[2 * i]) || !isfinite(xy[2 * i + 1])) return RQT_INVALID;
-        box_add(&box, xy[2 * i], xy[2 * i + 1]);
-    }
+    const double *at = xy;
+    for (size_t r = 0; r < rings; r++)
+        for (size_t i = 0; i < ring_points[r]; i++, at += 2) {
+            if (!isfinite(at[0]) || !isfinite(at[1])) return RQT_INVALID;
+            box_add(&box, at[0], at[1]);
+        }
 
     uint8_t *p = allocator->resize(allocator->context, NULL, (size_t)total);
     if (!p) return RQT_NO_MEMORY;
     *bytes = p;
     *size = (size_t)total;
     p = put_gpkg_head(p, GPKG_BOXED, srid, &box);
-    p = put_byte(p, 1);
-    p = put_u32(p, POLYGON);
-    p = put_u32(p, 1);
-    p = put_u32(p, (uint32_t)n + 1);
-    for (size_t i = 0; i <= (size_t)n; i++) {
-        size_t at = i < (size_t)n ? i : 0; /* closed */
-        p = put_double(p, xy[2 * at]);
-        p = put_double(p, xy[2 * at + 1]);
+    if (polygons > 1) {
+        p = put_byte(p, 1);
+        p = put_u32(p, MULTIPOLYGON);
+        p = put_u32(p, (uint32_t)polygons);
+    }
+    at = xy;
+    for (size_t r = 0; r < rings; r++) {
+        const size_t n = ring_points[r];
+        if (ring_is_shell[r]) {
+            uint32_t own = 1;
+            while (r + own < rings && !ring_is_shell[r + own]) own++;
+            p = put_byte(p, 1);
+            p = put_u32(p, POLYGON);
+            p = put_u32(p, own);
+        }
+        p = put_u32(p, (uint32_t)n + 1);
+        for (size_t i = 0; i <= n; i++) { /* closed */
+            p = put_double(p, at[2 * (i % n)]);
+            p = put_double(p, at[2 * (i % n) + 1]);
+        }
+        at += 2 * n;
     }
     return RQT_OK;
+}
+
+rqt_status format_ring_gpkg(const double *xy, int n, int32_t srid, const rqt_allocator *allocator, uint8_t **bytes,
+                            size_t *size) {
+    const size_t points = n > 0 ? (size_t)n : 0;
+    const unsigned char shell = 1;
+    return format_polygons_gpkg(xy, &points, &shell, 1, srid, allocator, bytes, size);
 }

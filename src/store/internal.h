@@ -91,7 +91,7 @@ int store_query_computed(store *s, const store_terrain *t, store_question *quest
 void store_methods_free(store *s);
 /* A row per answer of a query, as its summary has it. query.c */
 int store_begin_reads(const rqt_query *query, store_reads *reads);
-int64_t store_count_selected(const rqt_query *query, const rqt_block *block);
+int64_t store_count_selected(const rqt_query *query, rqt_block_number number, const rqt_block *block);
 /* Was sqlite3_interrupt called? *code says how to end. query.c */
 bool store_is_interrupted(store *s, int *code);
 

@@ -77,7 +77,10 @@ typedef struct store_query_options {
     rqt_outline outline;
     rqt_metric metric;   /* exact is what is stored; minimal may be; the others are computed, see methods.c */
     rqt_product product; /* what the patch holds */
-    bool wants_leaves;   /* fill patch->leaves; with RQT_PRODUCT_TRIANGLES only */
+    /* NULL, or what else selects: the store sets its eps. Only for metrics whose mesh stays right when vertices are
+     * added: exact, local, wedgie, euclid; minimal is SQLITE_ERROR. */
+    rqt_rule *rule;
+    bool wants_leaves; /* fill patch->leaves; with RQT_PRODUCT_TRIANGLES only */
 } store_query_options;
 
 /* One row per block that answered, in Morton order. */
