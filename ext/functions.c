@@ -48,18 +48,18 @@ const function rqt_functions[] = {
      .returns = "x, y, z, error, level",
      .purpose = "The vertices of the mesh of a region, each once. error: the stored saturated error in metres, "
                 "infinite at the "
-                "root's corners; level 0 is the coarsest. geom: the vertex as a GeoPackage POINT Z.",
+                "root's corners; level 0 is the coarsest. gpkg: the vertex as a GeoPackage POINT Z.",
      .example = "SELECT count(*) FROM rqt_range(" SUMMIT ", 10)",
      .fill = fill_range,
-     .hidden = "col, row, q, achieved_eps, geom"},
+     .hidden = "col, row, q, achieved_eps, gpkg"},
     {.name = "rqt_triangles",
      .arguments = MESH,
      .returns = "id, x0, y0, z0, x1, y1, z1, x2, y2, z2",
-     .purpose = "The triangles of the mesh of a region, counter-clockwise seen from above. geom: the triangle as a "
-                "GeoPackage POLYGON Z, for layers; as a result of OGR write +geom AS geom.",
+     .purpose = "The triangles of the mesh of a region, counter-clockwise seen from above. gpkg: the triangle as a "
+                "GeoPackage POLYGON Z, for layers; as a result of OGR write +gpkg AS geom.",
      .example = "SELECT count(*), max(z0) FROM rqt_triangles(" SUMMIT ", 10)",
      .fill = fill_triangles,
-     .hidden = "achieved_eps, geom"},
+     .hidden = "achieved_eps, gpkg"},
     {.name = "rqt_strip",
      .arguments = MESH,
      .returns = "seq, x, y, z",

@@ -14,8 +14,8 @@ DROP TABLE IF EXISTS terrain_mesh;
 DELETE FROM gpkg_geometry_columns WHERE table_name = 'terrain_mesh';
 DELETE FROM gpkg_contents WHERE table_name = 'terrain_mesh';
 CREATE TABLE terrain_mesh(fid INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL, geom POLYGON, low REAL, high REAL);
-CREATE TEMP TABLE mesh AS SELECT *, geom FROM rqt_triangles(rqt_bbox(-71.40, 44.20, -71.20, 44.34), 20);
-INSERT INTO terrain_mesh(geom, low, high) SELECT geom, min(z0, z1, z2), max(z0, z1, z2) FROM mesh;
+CREATE TEMP TABLE mesh AS SELECT *, gpkg FROM rqt_triangles(rqt_bbox(-71.40, 44.20, -71.20, 44.34), 20);
+INSERT INTO terrain_mesh(geom, low, high) SELECT gpkg, min(z0, z1, z2), max(z0, z1, z2) FROM mesh;
 -- The terrain's CRS, where the GeoPackage does not have it yet; 100000 for one without a code, -1 for none.
 INSERT OR IGNORE INTO gpkg_spatial_ref_sys(srs_name, srs_id, organization, organization_coordsys_id, definition)
   SELECT substr(crs, instr(crs, '"') + 1, instr(substr(crs, instr(crs, '"') + 1), '"') - 1), srid, 'EPSG', srid, crs FROM rqt_terrains WHERE srid > 0 AND crs <> '';
@@ -27,4 +27,6 @@ DROP TABLE mesh;
 COMMIT;
 
 SELECT count(*), min(low), max(high) FROM terrain_mesh;
+--> 8741|353.0|1906.0
 SELECT round(min_x, 4), round(min_y, 4), round(max_x, 4), round(max_y, 4), srs_id FROM gpkg_contents WHERE table_name = 'terrain_mesh';
+--> -71.4|44.2|-71.2|44.3467|4326

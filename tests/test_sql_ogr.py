@@ -136,7 +136,7 @@ check("there is something to convert", len(TRIANGLES) > 500 and len(VERTICES) > 
 db.close()
 for kind, path in databases.items():
     # OGR knows GeoPackage's geometry in a GeoPackage only; SpatiaLite, which it brings along, makes its own of it elsewhere.
-    geom, form, more = ("+geom", "gpkg", ()) if kind == "a GeoPackage" else ("CastAutomagic(geom)", "spatialite", ())
+    geom, form, more = ("+gpkg", "gpkg", ()) if kind == "a GeoPackage" else ("CastAutomagic(gpkg)", "spatialite", ())
     if kind == "a plain database":
         more = ("-a_srs", "EPSG:2056")  # its results carry no CRS
     convert("triangles of " + kind, path, "SELECT id, %s AS geom FROM rqt_triangles('%s', 10)" % (geom, REGION), TRIANGLES, "EPSG:2056", more)
@@ -151,8 +151,8 @@ db = s.connect(africa)
 wanted = [("POLYGON Z", t) for t in s.triangles(db, "POINT(30.01 0.02)", 0) + s.triangles(db, "LINESTRING(31 1, 33 2)", 50)]
 db.close()
 check("coordinates that need 17 digits are among them", any(float("%.15g" % p[0]) != p[0] for w in wanted for p in points_of(w)))
-convert("degrees", africa, "SELECT +geom AS geom FROM rqt_triangles('POINT(30.01 0.02)', 0) UNION ALL "
-                           "SELECT +geom FROM rqt_triangles('LINESTRING(31 1, 33 2)', 50)", wanted, "EPSG:4326")
+convert("degrees", africa, "SELECT +gpkg AS geom FROM rqt_triangles('POINT(30.01 0.02)', 0) UNION ALL "
+                           "SELECT +gpkg FROM rqt_triangles('LINESTRING(31 1, 33 2)', 50)", wanted, "EPSG:4326")
 
 # ------------------------------------------------------------------------------------------------ beside other layers
 parcels = {"meadow": "POLYGON((2721000 1209000, 2721400 1209000, 2721400 1209300, 2721000 1209000))",
@@ -167,7 +167,7 @@ said, status = s.run(["ogr2ogr", "-update", path, s.temp("parcels.geojson"), "-n
 check("a layer of parcels in the same GeoPackage", status == 0, said)
 db = s.connect(path)
 wanted = [("POLYGON Z", t) for name, eps in (("meadow", 5), ("forest", 20)) for t in s.triangles(db, parcels[name], eps)]
-JOIN = "SELECT p.name, t.id AS triangle, +t.geom AS geom FROM parcels p, rqt_triangles(p.geom, p.eps) t"
+JOIN = "SELECT p.name, t.id AS triangle, +t.gpkg AS geom FROM parcels p, rqt_triangles(p.geom, p.eps) t"
 convert("triangles of every parcel, at its eps", path, JOIN, wanted, "EPSG:2056")
 with_names = s.temp("named.csv")
 ogr2ogr("-f", "CSV", with_names, path, "-sql", "SELECT p.name, count(*) AS n FROM parcels p, rqt_triangles(p.geom, p.eps) t GROUP BY 1 ORDER BY p.eps")
@@ -185,20 +185,20 @@ db = s.connect(path)
 equal("the terrain is as sound as before", rows(db, "SELECT * FROM rqt_check") + rows(db, "PRAGMA quick_check"), [("ok",)])
 equal("no view over our functions is in the file", rows(db, "SELECT name FROM sqlite_schema WHERE type IN ('view', 'trigger') AND sql LIKE '%rqt\\_%(%' ESCAPE '\\'"), [])
 
-# ------------------------------------------------------------------------------------------------ what `geom` is
-equal("geom of a triangle is its corners, closed, with the terrain's SRID and its box",
-      [(blob[:8], geometry(blob, 40)[0], struct.unpack_from("<4d", blob, 8)) for blob, in rows(db, "SELECT geom FROM rqt_triangles(?, 10)", REGION)],
+# ------------------------------------------------------------------------------------------------ what `gpkg` is
+equal("gpkg of a triangle is its corners, closed, with the terrain's SRID and its box",
+      [(blob[:8], geometry(blob, 40)[0], struct.unpack_from("<4d", blob, 8)) for blob, in rows(db, "SELECT gpkg FROM rqt_triangles(?, 10)", REGION)],
       [(b"GP\0\3" + struct.pack("<i", 2056), t, (min(p[0] for p in t[1]), max(p[0] for p in t[1]), min(p[1] for p in t[1]), max(p[1] for p in t[1]))) for t in TRIANGLES])
-equal("geom of a vertex is a point without a box",
-      [(blob[:8], geometry(blob, 8)[0], len(blob)) for blob, in rows(db, "SELECT geom FROM rqt_range(?, 10)", REGION)],
+equal("gpkg of a vertex is a point without a box",
+      [(blob[:8], geometry(blob, 8)[0], len(blob)) for blob, in rows(db, "SELECT gpkg FROM rqt_range(?, 10)", REGION)],
       [(b"GP\0\1" + struct.pack("<i", 2056), p, 37) for p in VERTICES])
 equal("a triangle's geometry is a region itself: those of the mesh that it is in",
-      rows(db, "SELECT min(n), max(n) FROM (SELECT (SELECT count(*) FROM rqt_triangles(t.geom, 10)) AS n FROM rqt_triangles(?, 10) t LIMIT 50)", REGION), [(1, 1)])
-equal("geom does not show in SELECT *", len(db.execute("SELECT * FROM rqt_triangles('POINT(2721000 1209000)', 10)").description), 10)
+      rows(db, "SELECT min(n), max(n) FROM (SELECT (SELECT count(*) FROM rqt_triangles(t.gpkg, 10)) AS n FROM rqt_triangles(?, 10) t LIMIT 50)", REGION), [(1, 1)])
+equal("gpkg does not show in SELECT *", len(db.execute("SELECT * FROM rqt_triangles('POINT(2721000 1209000)', 10)").description), 10)
 db.close()
 nowhere = s.temp("nowhere.db")
 s.import_terrain(nowhere, s.write_grid(s.temp("nowhere.asc"), [[1, 2], [3, 4]]), name="nowhere")
 db = s.connect(nowhere)
-equal("without a CRS its SRID is undefined, -1", rows(db, "SELECT DISTINCT substr(hex(geom), 9, 8) FROM rqt_triangles(NULL, 0)"), [("FFFFFFFF",)])
+equal("without a CRS its SRID is undefined, -1", rows(db, "SELECT DISTINCT substr(hex(gpkg), 9, 8) FROM rqt_triangles(NULL, 0)"), [("FFFFFFFF",)])
 db.close()
 s.finish()

@@ -42,7 +42,7 @@ def agree(title, db):
         return "%s: %s" % (title, name)
 
     # Areas
-    found = rows(db, "SELECT ST_Area(rqt_mesh(r.value, e.value, 'spatialite')), (SELECT sum(ST_Area(CastAutomagic(t.geom))) FROM rqt_triangles(r.value, e.value) t), "
+    found = rows(db, "SELECT ST_Area(rqt_mesh(r.value, e.value, 'spatialite')), (SELECT sum(ST_Area(CastAutomagic(t.gpkg))) FROM rqt_triangles(r.value, e.value) t), "
                      "v.area FROM json_each(?) r, json_each('[0, 3, 20, 200]') e, rqt_verify(r.value, e.value) v", s.json.dumps(REGIONS))
     check(named("ST_Area of a mesh, and of its triangles, is rqt_verify's area: %d of them" % len(found)),
           len(found) == 20 and all(near(a, c) and near(b, c) and c > 5e4 for a, b, c in found), found)
@@ -53,12 +53,12 @@ def agree(title, db):
 
     # Neighbouring windows
     for eps in (0, 7, 60):
-        a, b = (set(r[0] for r in rows(db, "SELECT geom FROM rqt_triangles(?, ?)", region, eps)) for region in (WEST, EAST))
-        both = set(r[0] for r in rows(db, "SELECT geom FROM rqt_triangles(?, ?)", BOTH, eps))
+        a, b = (set(r[0] for r in rows(db, "SELECT gpkg FROM rqt_triangles(?, ?)", region, eps)) for region in (WEST, EAST))
+        both = set(r[0] for r in rows(db, "SELECT gpkg FROM rqt_triangles(?, ?)", BOTH, eps))
         equal(named("eps %d: patches of neighbouring windows are parts of their union's, byte for byte" % eps), a | b, both)
-        common = "SELECT geom FROM rqt_triangles('%s', %d) INTERSECT SELECT geom FROM rqt_triangles('%s', %d)" % (WEST, eps, EAST, eps)
+        common = "SELECT gpkg FROM rqt_triangles('%s', %d) INTERSECT SELECT gpkg FROM rqt_triangles('%s', %d)" % (WEST, eps, EAST, eps)
         area, shared, mine = rows(db, "WITH common(geom) AS MATERIALIZED (%s), west AS (SELECT ST_UnaryUnion(ST_Collect(CastAutomagic(geom))) AS g FROM "
-                                      "(SELECT geom FROM rqt_triangles(?1, ?3) EXCEPT SELECT geom FROM common)), "
+                                      "(SELECT gpkg AS geom FROM rqt_triangles(?1, ?3) EXCEPT SELECT geom FROM common)), "
                                       "east AS (SELECT ST_UnaryUnion(rqt_mesh(?2, ?3, 'spatialite')) AS g) "
                                       "SELECT ST_Area(ST_Intersection(west.g, east.g)), (SELECT count(*) FROM common), ST_Area(west.g) FROM west, east" % common, WEST, EAST, eps)[0]
         check(named("eps %d: but for the triangles that both have, they meet in no area" % eps), (area or 0) == 0 and shared > 0 and mine > 3e5, (area, shared, mine))
@@ -71,19 +71,19 @@ def agree(title, db):
     # Each triangle, each vertex
     t = s.triangles(db, REGIONS[1], 10)
     found = rows(db, "SELECT ST_IsValid(g), ST_NDims(g), ST_SRID(g), ST_GeometryType(g), ST_NumPoints(ST_ExteriorRing(g)), ST_MinZ(g), ST_MaxZ(g), "
-                     "ST_3DLength(ST_ExteriorRing(g)) FROM (SELECT CastAutomagic(geom) AS g FROM rqt_triangles(?, 10))", REGIONS[1])
+                     "ST_3DLength(ST_ExteriorRing(g)) FROM (SELECT CastAutomagic(gpkg) AS g FROM rqt_triangles(?, 10))", REGIONS[1])
     equal(named("every triangle is a valid POLYGON Z of four points, with its SRID"), set(r[:5] for r in found), {(1, 3, 2056, "POLYGON Z", 4)})
     equal(named("ST_MinZ and ST_MaxZ of every triangle"), [r[5:7] for r in found], [(min(p[2] for p in c), max(p[2] for p in c)) for c in t])
     check(named("ST_3DLength of every triangle's ring"), len(found) == len(t) and all(near(r[7], triangle_length(c), 1e-12) for r, c in zip(found, t)))
     equal(named("ST_X, ST_Y, ST_Z of every vertex are its x, y, z"),
-          rows(db, "SELECT count(*), sum(ST_X(g) = x AND ST_Y(g) = y AND ST_Z(g) = z AND ST_SRID(g) = 2056) FROM (SELECT x, y, z, CastAutomagic(geom) AS g FROM rqt_range(?, 10))", REGIONS[1]),
+          rows(db, "SELECT count(*), sum(ST_X(g) = x AND ST_Y(g) = y AND ST_Z(g) = z AND ST_SRID(g) = 2056) FROM (SELECT x, y, z, CastAutomagic(gpkg) AS g FROM rqt_range(?, 10))", REGIONS[1]),
           [(one(db, "SELECT count(*) FROM rqt_range(?, 10)", REGIONS[1]),) * 2])
     equal(named("... and its triangles are those that it touches"), rows(db, "SELECT min(n) >= 1, max(n) <= 8 FROM (SELECT (SELECT count(*) FROM rqt_triangles(g, 10)) AS n FROM "
-                                                                         "(SELECT CastAutomagic(geom) AS g FROM rqt_range(?, 10) LIMIT 60))", REGIONS[1]), [(1, 1)])
+                                                                         "(SELECT CastAutomagic(gpkg) AS g FROM rqt_range(?, 10) LIMIT 60))", REGIONS[1]), [(1, 1)])
 
     # Another CRS: PROJ by SpatiaLite's hand, beside PROJ by GDAL's. To degrees on the same datum: between datums PROJ offers
     # several ways, some centimetres apart, and the two choose differently.
-    vertices = rows(db, "SELECT x, y, z, ST_X(g), ST_Y(g), ST_Z(g), ST_SRID(g) FROM (SELECT x, y, z, ST_Transform(CastAutomagic(geom), 4150) AS g FROM rqt_range(?, 40))", REGIONS[1])
+    vertices = rows(db, "SELECT x, y, z, ST_X(g), ST_Y(g), ST_Z(g), ST_SRID(g) FROM (SELECT x, y, z, ST_Transform(CastAutomagic(gpkg), 4150) AS g FROM rqt_range(?, 40))", REGIONS[1])
     said, status = s.run(["gdaltransform", "-s_srs", "EPSG:2056", "-t_srs", "EPSG:4150", "-output_xy"], text="".join("%r %r\n" % r[:2] for r in vertices))
     expected = [tuple(map(float, line.split())) for line in said.splitlines()] if status == 0 else []
     check(named("ST_Transform of the vertices is GDAL's to a tenth of a millimetre, heights untouched"),
@@ -98,11 +98,11 @@ def agree(title, db):
     db.execute("BEGIN")
     db.execute("CREATE TABLE surface(id INTEGER PRIMARY KEY)")
     made = rows(db, "SELECT AddGeometryColumn('surface', 'geom', 2056, 'POLYGON', 'XYZ')")
-    db.execute("INSERT INTO surface SELECT id, CastAutomagic(geom) FROM rqt_triangles(?, 10)", (REGIONS[1],))
+    db.execute("INSERT INTO surface SELECT id, CastAutomagic(gpkg) FROM rqt_triangles(?, 10)", (REGIONS[1],))
     indexed = rows(db, "SELECT CreateSpatialIndex('surface', 'geom'), CheckSpatialIndex('surface', 'geom')")
     equal(named("triangles go into a SpatiaLite layer, XYZ, and its index is sound"), (made, indexed, one(db, "SELECT count(*) FROM surface")), ([(1,)], [(1, 1)], len(t)))
     equal(named("its index finds the triangle over a place, and ST_Contains agrees with rqt_triangles"),
-          rows(db, "SELECT id, geom = CastAutomagic(t) FROM surface, (SELECT geom AS t FROM rqt_triangles('POINT(2721403.3 1209401.7)', 10)) WHERE surface.rowid IN (SELECT rowid FROM SpatialIndex "
+          rows(db, "SELECT id, geom = CastAutomagic(t) FROM surface, (SELECT gpkg AS t FROM rqt_triangles('POINT(2721403.3 1209401.7)', 10)) WHERE surface.rowid IN (SELECT rowid FROM SpatialIndex "
                    "WHERE f_table_name = 'surface' AND search_frame = MakePoint(2721403.3, 1209401.7, 2056)) AND ST_Contains(geom, MakePoint(2721403.3, 1209401.7, 2056))")[0][1:], (1,))
     db.execute("ROLLBACK")
 

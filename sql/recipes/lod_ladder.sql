@@ -23,6 +23,14 @@ INSERT INTO ladder SELECT 7, 1, count(*), julianday('now') FROM rqt_range(NULL, 
 SELECT l.eps, l.vertices, round(100.0 * l.vertices / (t.width * t.height - t.voids), 2), (SELECT count(*) FROM rqt_triangles(NULL, l.eps)),
        length(rqt_mesh(NULL, l.eps, 'rqt')), length(rqt_mesh(NULL, l.eps, 'strip')), round(86400000 * (l.ended - before.ended))
 FROM ladder l JOIN ladder before ON before.rung = l.rung - 1, rqt_terrains t ORDER BY l.rung;
+--> 100.0|8454|0.59|16669|11336|206428|*
+--> 50.0|25476|1.77|50547|29754|623996|*
+--> 20.0|89046|6.17|177300|89977|2181532|*
+--> 10.0|211712|14.68|422158|190126|5192676|*
+--> 5.0|449663|31.17|897345|359325|11050380|*
+--> 2.0|876481|60.77|1749889|605388|21682324|*
+--> 1.0|1106806|76.73|2209909|706382|27546128|*
 
 -- The other way round: the best mesh within a budget of vertices, and the eps that it has.
 SELECT count(*), max(achieved_eps) FROM rqt_range(NULL, 0, NULL, '{"max_vertices": 10000}');
+--> 9987|90.5

@@ -20,9 +20,13 @@ CREATE TEMP TABLE along AS
 
 -- Length in kilometres, lowest and highest, metres up and down.
 SELECT name, round(max(distance) / 1000, 2), round(min(z)), round(max(z)), round(sum(max(next_z - z, 0))), round(sum(max(z - next_z, 0))) FROM along GROUP BY id;
+--> Pinkham Notch to the summit|4.38|619.0|1907.0|1288.0|0.0
+--> Bretton Woods to the summit|11.19|493.0|1907.0|1465.0|63.0
 
 -- The steepest 200 metres of each: gradient in per cent, and where it begins. Heights at every 50 metres.
 WITH RECURSIVE step(metres) AS (SELECT 0 UNION ALL SELECT metres + 50 FROM step WHERE metres < 20000),
 post AS (SELECT id, name, metres, max(z + (next_z - z) * (metres - distance) / (next_distance - distance)) AS height
   FROM along, step WHERE distance <= metres AND next_distance >= metres AND next_distance > distance GROUP BY id, metres)
 SELECT a.name, round(max(abs(b.height - a.height)) / 2, 1) AS per_cent, a.metres AS at FROM post a JOIN post b ON b.id = a.id AND b.metres = a.metres + 200 GROUP BY a.id;
+--> Pinkham Notch to the summit|70.8|2550
+--> Bretton Woods to the summit|64.8|9850

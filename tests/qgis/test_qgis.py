@@ -190,7 +190,7 @@ for title, source, crs, eps, box in (("mountain", s.DEMO, "EPSG:4326", 20, MOUNT
     said, status = s.run([s.RQT, "mesh", database, "--eps", str(eps), "--normals", "-o", s.temp(title + "-normals.ply")] + (["--region", region] if region else []))
     check("%s: rqt mesh writes ply with normals" % title, status == 0, said)
     check_mesh(title + "-normals", s.temp(title + "-normals.ply"), db, eps, wanted, crs, low, high)
-    query = "SELECT id, +geom AS geom FROM rqt_triangles(%s, %d)" % ("rqt_bbox(%r, %r, %r, %r)" % box if box else "NULL", eps)
+    query = "SELECT id, +gpkg AS geom FROM rqt_triangles(%s, %d)" % ("rqt_bbox(%r, %r, %r, %r)" % box if box else "NULL", eps)
     check_triangles(title + "-query", QgsVectorLayer("%s|layername=rqt_terrain|subset=%s" % (database, query), title, "ogr"), wanted, crs, low, high)
     db.close()
 application.exitQgis()
