@@ -4,99 +4,7 @@
  * The patches come from queries over blocks of every legal size, on random terrains with voids, of clamped sizes,
  * whole and in windows. Bytes to be read are in allocations of exactly their size, so that a sanitizer sees one too
  * far. */
-#include "test_core_walk.h"
-
-#include <zstd.h>
-
-static const rqt_placement SOMEWHERE = {12.5, -3, 0.25, -0.5};
-#define EPS(code) rqt_code_metres((rqt_code)(code))
-
-/* A patch with leaves, the blocks that it came from, and its header. */
-typedef struct answer {
-    rqt_patch patch;
-    rqt_block_number *numbers;
-    size_t count;
-    rqt_wire_header header;
-} answer;
-
-static answer ask(database *d, const model *m, const rqt_region *region, rqt_code eps, rqt_outline outline) {
-    rqt_answer *answers = calloc(d->count ? d->count : 1, sizeof *answers);
-    answer out = {.numbers = calloc(d->count + 1, sizeof *out.numbers)};
-    if (!answers || !out.numbers) abort();
-    rqt_query query = {.lattice = d->lattice,
-                       .k = d->k,
-                       .region = region,
-                       .eps = eps,
-                       .outline = outline,
-                       .wants_leaves = true,
-                       .answers = answers,
-                       .answer_count = database_answers(d, region, eps, outline, answers),
-                       .read_block = database_read,
-                       .context = d};
-    d->asking = &query;
-    assert_int_equal(rqt_query_run(&query, &test_allocator, &out.patch), RQT_OK);
-    d->asking = NULL;
-    out.count = query.answer_count;
-    for (size_t i = 0; i < out.count; i++) out.numbers[i] = answers[i].number;
-    free(answers);
-    out.header = (rqt_wire_header){
-        .lattice = d->lattice, .k = d->k, .placement = SOMEWHERE, .unit = m->r.unit, .eps = EPS(eps), .srid = 4711};
-    return out;
-}
-
-static void answer_free(answer *a) {
-    rqt_patch_free(&a->patch);
-    free(a->numbers);
-}
-
-/* Bytes in an allocation of exactly their size. */
-typedef struct blob {
-    uint8_t *bytes;
-    size_t size;
-} blob;
-
-static blob blob_of(const uint8_t *bytes, size_t size) {
-    blob b = {malloc(size ? size : 1), size};
-    if (!b.bytes) abort();
-    memcpy(b.bytes, bytes, size);
-    return b;
-}
-
-static blob encode_as(const answer *a, const answer *from, const char *what) {
-    const size_t bound = rqt_wire_bound(a->patch.vertex_count, a->patch.triangle_count, a->count);
-    rqt_wire_header header = a->header;
-    uint8_t *bytes = malloc(bound);
-    size_t size = 1;
-    if (!bytes) abort();
-    if (from) header.eps_from = from->header.eps;
-    const rqt_status status = rqt_wire_encode(&header, a->numbers, a->count, &a->patch, from ? &from->patch : NULL,
-                                              &test_allocator, bytes, &size);
-    CHECK(status == RQT_OK, "%s: encode: status %d", what, (int)status);
-    CHECK(size <= bound, "%zu bytes, bound %zu", size, bound);
-    blob b = blob_of(bytes, size);
-    free(bytes);
-    return b;
-}
-
-static blob encode(const answer *a, const answer *from) {
-    return encode_as(a, from, "a mesh");
-}
-
-static void check_same_patch(const rqt_patch *a, const rqt_patch *b, const char *what) {
-    CHECK(a->vertex_count == b->vertex_count && a->triangle_count == b->triangle_count,
-          "%s: %zu vertices, %zu triangles; should be %zu, %zu", what, a->vertex_count, a->triangle_count,
-          b->vertex_count, b->triangle_count);
-    for (size_t i = 0; i < a->vertex_count; i++) {
-        const rqt_patch_vertex *v = &a->vertices[i], *w = &b->vertices[i];
-        CHECK(v->col == w->col && v->row == w->row && v->q == w->q && v->level == w->level,
-              "%s: vertex %zu is (%d,%d) %d level %d; should be (%d,%d) %d level %d", what, i, v->col, v->row, v->q,
-              v->level, w->col, w->row, w->q, w->level);
-    }
-    for (size_t i = 0; i < 3 * a->triangle_count; i++)
-        CHECK(a->triangles[i] == b->triangles[i], "%s: triangle %zu", what, i / 3);
-    for (size_t i = 0; a->leaves && b->leaves && i < a->triangle_count; i++)
-        CHECK(memcmp(&a->leaves[i], &b->leaves[i], sizeof *a->leaves) == 0, "%s: leaf %zu", what, i);
-}
+#include "test_wire_support.h"
 
 static void check_header(const rqt_wire_header *h, const answer *a) {
     const rqt_wire_header *w = &a->header;
@@ -131,15 +39,6 @@ static void check_round_trip(const answer *a, const char *what) {
 }
 
 /* -------------------------------------------------------------------------------------- round trips -- */
-
-static raster random_raster(int n) {
-    static const int sides[] = {1, 2, 3, 4, 5, 8, 9, 15, 16, 17, 18, 31, 33, 34};
-    const int odd = random_between(0, 13), other = random_between(0, 2) ? odd : random_between(0, 13);
-    const int voids[] = {-1, -1, 0, 2, 20, 100};
-    raster r = raster_make((surface)(n % SURFACE_COUNT), sides[odd], sides[other], voids[random_between(0, 5)]);
-    if (random_between(0, 2) == 0) raster_add_lake(&r);
-    return r;
-}
 
 typedef void check_one(const model *m, database *d, const rqt_region *region, rqt_outline outline,
                        const char *what);
@@ -359,158 +258,7 @@ static void increments_that_belong_elsewhere_are_refused_with_a_reason(void **st
     model_free(&m);
 }
 
-/* ------------------------------------------------------------------------------------------- normals -- */
-
-static float *random_normals(size_t count) {
-    float *n = calloc(3 * count + 1, sizeof *n);
-    if (!n) abort();
-    for (size_t i = 0; i < count; i++) {
-        const double x = random_unit() * 8 - 4, y = random_unit() * 8 - 4, length = sqrt(x * x + y * y + 1);
-        n[3 * i] = (float)(x / length), n[3 * i + 1] = (float)(y / length), n[3 * i + 2] = (float)(1 / length);
-    }
-    return n;
-}
-
-static blob encode_with(const answer *a, const float *normals) {
-    const size_t count = a->patch.vertex_count;
-    blob mesh = encode(a, NULL);
-    uint8_t *bytes = realloc(mesh.bytes, mesh.size + rqt_wire_normals_bound(count));
-    if (!bytes) abort();
-    size_t size = mesh.size;
-    assert_int_equal(rqt_wire_add_normals(normals, count, &test_allocator, bytes, &size), RQT_OK);
-    CHECK(size <= mesh.size + rqt_wire_normals_bound(count), "bound");
-    blob b = blob_of(bytes, size);
-    assert_int_equal(rqt_wire_add_normals(normals, count, &test_allocator, bytes, &size), RQT_INVALID);
-    free(bytes);
-    return b;
-}
-
-static void check_normals(const answer *a) {
-    const size_t count = a->patch.vertex_count;
-    float *normals = random_normals(count), *read = random_normals(count + 1);
-    blob with = encode_with(a, normals), without = encode(a, NULL);
-    rqt_wire_header header;
-    rqt_patch patch;
-    rqt_message why;
-    assert_int_equal(rqt_wire_decode(with.bytes, with.size, true, &test_allocator, &header, &patch, &why), RQT_OK);
-    assert_true(header.has_normals);
-    check_same_patch(&patch, &a->patch, "a mesh with normals");
-    rqt_patch_free(&patch);
-    assert_int_equal(rqt_wire_normals(with.bytes, with.size, count, &test_allocator, read, &why), RQT_OK);
-    for (size_t i = 0; i < count; i++) {
-        const float *n = normals + 3 * i, *m = read + 3 * i;
-        const double dot = (double)n[0] * m[0] + (double)n[1] * m[1] + (double)n[2] * m[2];
-        CHECK(dot > cos(0.56 * M_PI / 180), "normal %zu is (%g %g %g), was (%g %g %g)", i, m[0], m[1], m[2], n[0],
-              n[1], n[2]);
-    }
-    static const size_t others[] = {1, (size_t)-1};
-    for (int i = 0; i < 2; i++) {
-        assert_int_equal(rqt_wire_normals(with.bytes, with.size, count + others[i], &test_allocator, read, &why),
-                         RQT_INVALID);
-        assert_true(why.text[0]);
-    }
-    assert_int_equal(rqt_wire_normals(without.bytes, without.size, count, &test_allocator, read, &why),
-                     RQT_INVALID);
-    CHECK(strstr(why.text, "without normals"), "%s", why.text);
-    assert_int_equal(rqt_wire_info(without.bytes, without.size, &header, &why), RQT_OK);
-    assert_false(header.has_normals);
-    free(with.bytes);
-    free(without.bytes);
-    free(normals);
-    free(read);
-}
-
-static void normals_come_back_beside_an_unchanged_mesh(void **state) {
-    (void)state;
-    random_begin("normals");
-    const float up[3] = {0, 0, 1};
-    float unpacked[3];
-    int8_t packed[2];
-    rqt_normal_pack(up, packed);
-    rqt_normal_unpack(packed, unpacked);
-    assert_memory_equal(up, unpacked, sizeof up);
-    for (int u = -127; u <= 127; u++)
-        for (int v = -127; v <= 127; v++) { /* what is packed already stays as it is */
-            const int8_t first[2] = {(int8_t)u, (int8_t)v};
-            rqt_normal_unpack(first, unpacked);
-            rqt_normal_pack(unpacked, packed);
-            CHECK(packed[0] == u && packed[1] == v, "(%d,%d) becomes (%d,%d)", u, v, packed[0], packed[1]);
-            CHECK(unpacked[2] >= 0, "(%d,%d) points down", u, v);
-        }
-    for (int n = 0; n < 20; n++) {
-        model m;
-        database d;
-        model_create(&m, random_raster(n));
-        assert_int_equal(database_create(&d, &m, smallest_k(&m.grid.lattice), &test_allocator), RQT_OK);
-        window w = window_all();
-        rqt_region *region = region_of(&w, &m.grid.lattice);
-        answer coarse = ask(&d, &m, region, (rqt_code)random_eps(&m), RQT_OUTLINE_EXACT),
-               fine = ask(&d, &m, region, 0, RQT_OUTLINE_EXACT);
-        check_normals(&coarse);
-        check_normals(&fine);
-        blob delta = encode(&fine, &coarse); /* has none, and takes none */
-        float *normals = random_normals(fine.patch.vertex_count);
-        size_t size = delta.size;
-        assert_int_equal(
-            rqt_wire_add_normals(normals, fine.patch.vertex_count, &test_allocator, delta.bytes, &size),
-            RQT_INVALID);
-        free(normals);
-        free(delta.bytes);
-        answer_free(&coarse);
-        answer_free(&fine);
-        rqt_region_free(region);
-        database_free(&d, &test_allocator);
-        model_free(&m);
-    }
-}
-
 /* ------------------------------------------------------------------------------------- hostile bytes -- */
-
-/* FORMAT.md, "Checksum", of bytes whose checksum is at 8. */
-static void seal(blob *b) {
-    memset(b->bytes + 8, 0, 8);
-    uint64_t h = 0x9E3779B97F4A7C15U ^ (uint64_t)b->size * 0xFF51AFD7ED558CCDU;
-    for (size_t at = 0; at < b->size; at += 8) {
-        uint64_t word = 0;
-        memcpy(&word, b->bytes + at, b->size - at < 8 ? b->size - at : 8);
-        h = (h ^ word) * 0xC2B2AE3D27D4EB4FU;
-        h = h << 29 | h >> 35;
-    }
-    h = (h ^ h >> 32) * 0xFF51AFD7ED558CCDU;
-    h ^= h >> 29;
-    memcpy(b->bytes + 8, &h, 8);
-}
-
-static size_t taken, refused;
-
-/* Whatever they are: OK with a patch that is sound, or CORRUPT; of an increment INVALID too. */
-static void read_hostile(const blob *b, const answer *from) {
-    rqt_wire_header header;
-    rqt_patch patch;
-    rqt_message why;
-    memset(&patch, 0xA5, sizeof patch);
-    const rqt_status status =
-        from
-            ? rqt_wire_apply(&from->header, &from->patch, b->bytes, b->size, &test_allocator, &header, &patch, &why)
-            : rqt_wire_decode(b->bytes, b->size, random_between(0, 1), &test_allocator, &header, &patch, &why);
-    if (status == RQT_OK) {
-        taken++;
-        for (size_t i = 0; i < 3 * patch.triangle_count; i++)
-            CHECK(patch.triangles[i] < patch.vertex_count, "index %zu", i);
-        for (size_t i = 0; i < patch.vertex_count; i++) {
-            const rqt_patch_vertex *v = &patch.vertices[i];
-            CHECK(v->col >= 0 && v->row >= 0 && v->col < header.lattice.width && v->row < header.lattice.height &&
-                      abs(v->q) < RQT_HEIGHT_LIMIT && v->level <= header.lattice.K,
-                  "vertex %zu", i);
-        }
-    } else {
-        refused++;
-        CHECK(status == RQT_CORRUPT || status == RQT_INVALID, "status %d", (int)status);
-        CHECK(why.text[0], "no sentence");
-        assert_true(patch.vertices == NULL && patch.vertex_count == 0);
-    }
-    rqt_patch_free(&patch);
-}
 
 /* The same header over another payload. */
 static blob with_payload(const blob *b, const uint8_t *payload, size_t size) {
@@ -527,12 +275,6 @@ static blob with_payload(const blob *b, const uint8_t *payload, size_t size) {
     blob exact = blob_of(out.bytes, out.size);
     free(out.bytes);
     return exact;
-}
-
-/* Another one, or one bit of it. */
-static uint8_t changed_byte(uint8_t byte, int bit) {
-    if (random_between(0, 1)) return (uint8_t)random_bits();
-    return (uint8_t)(byte ^ 1 << bit);
 }
 
 static void mutate(const blob *b, const answer *from, int rounds) {
@@ -576,38 +318,6 @@ static void mutate(const blob *b, const answer *from, int rounds) {
     free(payload);
 }
 
-/* Normals of hostile bytes: unit vectors, or refused. Those that lie under a right checksum, too. */
-static void mutate_normals(const answer *a, int rounds) {
-    const size_t count = a->patch.vertex_count, head = RQT_WIRE_HEADER_BYTES;
-    float *normals = random_normals(count), *read = random_normals(count);
-    blob b = encode_with(a, normals);
-    const size_t mesh = ZSTD_findFrameCompressedSize(b.bytes + head, b.size - head);
-    for (int n = 0; n < rounds; n++) {
-        blob copy = blob_of(b.bytes, b.size);
-        const size_t at = random_between(0, 1) ? (size_t)random_between(0, (int)head - 1)
-                                               : head + mesh + (size_t)(random_bits() % (b.size - head - mesh));
-        if (random_between(0, 3) == 0) copy.size = (size_t)(random_bits() % b.size);
-        if (at < copy.size) copy.bytes[at] = changed_byte(copy.bytes[at], n % 8);
-        if (copy.size >= 16 && random_between(0, 9)) seal(&copy);
-        blob exact = blob_of(copy.bytes, copy.size);
-        rqt_message why;
-        const rqt_status status = rqt_wire_normals(exact.bytes, exact.size, count, &test_allocator, read, &why);
-        CHECK(status == RQT_OK || ((status == RQT_CORRUPT || status == RQT_INVALID) && why.text[0]), "status %d",
-              (int)status);
-        for (size_t i = 0; i < count && status == RQT_OK; i++) {
-            const double dot = (double)read[3 * i] * read[3 * i] + (double)read[3 * i + 1] * read[3 * i + 1] +
-                               (double)read[3 * i + 2] * read[3 * i + 2];
-            CHECK(fabs(dot - 1) < 1e-5 && read[3 * i + 2] >= 0, "normal %zu", i);
-        }
-        read_hostile(&exact, NULL);
-        free(exact.bytes);
-        free(copy.bytes);
-    }
-    free(b.bytes);
-    free(normals);
-    free(read);
-}
-
 static void hostile_bytes_are_refused_or_harmless(void **state) {
     (void)state;
     random_begin("hostile");
@@ -630,7 +340,6 @@ static void hostile_bytes_are_refused_or_harmless(void **state) {
         blob mesh = encode(&fine, NULL), delta = encode(&fine, &coarse);
         mutate(&mesh, NULL, 400);
         mutate(&delta, &coarse, 200);
-        mutate_normals(&fine, 200);
         free(mesh.bytes);
         free(delta.bytes);
         answer_free(&coarse);
@@ -645,19 +354,6 @@ static void hostile_bytes_are_refused_or_harmless(void **state) {
 
 /* ------------------------------------------------------------------------------------------- memory -- */
 
-static rqt_status normals_way(const rqt_patch *patch, const uint8_t *bytes, size_t size) {
-    const size_t count = patch->vertex_count, room = size + rqt_wire_normals_bound(count);
-    float *normals = random_normals(count);
-    uint8_t *longer = malloc(room);
-    if (!longer) abort();
-    memcpy(longer, bytes, size);
-    rqt_status status = rqt_wire_add_normals(normals, count, &test_allocator, longer, &size);
-    if (status == RQT_OK) status = rqt_wire_normals(longer, size, count, &test_allocator, normals, NULL);
-    free(longer);
-    free(normals);
-    return status;
-}
-
 static rqt_status whole_way(const answer *coarse, const answer *fine) {
     const size_t bound = rqt_wire_bound(fine->patch.vertex_count, fine->patch.triangle_count, fine->count);
     uint8_t *bytes = malloc(bound);
@@ -669,7 +365,6 @@ static rqt_status whole_way(const answer *coarse, const answer *fine) {
     rqt_status status = rqt_wire_encode(&coarse->header, coarse->numbers, coarse->count, &coarse->patch, NULL,
                                         &test_allocator, bytes, &size);
     if (status == RQT_OK) status = rqt_wire_decode(bytes, size, true, &test_allocator, &header, &patch, &why);
-    if (status == RQT_OK) status = normals_way(&patch, bytes, size);
     rqt_wire_header h = fine->header;
     h.eps_from = coarse->header.eps;
     if (status == RQT_OK)
@@ -727,7 +422,6 @@ int main(void) {
         TEST(increments_end_in_the_mesh_as_asked_for_at_once),
         TEST(a_chain_of_increments_costs_little_more_than_the_mesh),
         TEST(increments_that_belong_elsewhere_are_refused_with_a_reason),
-        TEST(normals_come_back_beside_an_unchanged_mesh),
         TEST(hostile_bytes_are_refused_or_harmless),
         TEST(a_refused_allocation_is_reported_and_nothing_leaks),
     };
