@@ -63,6 +63,8 @@ void connection_owner(connection *c, bool owned);
 
 /* -------------------------------------------------------------------------------- requests for a patch */
 /* region, eps, terrain, options, as every mesh function takes them. request.c */
+typedef enum frame_kind { FRAME_CRS, FRAME_ECEF, FRAME_ENU } frame_kind; /* in the order of options.c */
+typedef struct space_frame space_frame;
 typedef struct request {
     connection *connection; /* held while the request lives */
     store *store;
@@ -75,6 +77,8 @@ typedef struct request {
     bool whole;            /* the options name a mode of whole triangles */
     struct cJSON *detail;  /* the option, as it came; NULL: none */
     struct places *places; /* what it says; detail.c */
+    frame_kind frame_kind; /* where the mesh is drawn */
+    space_frame *frame;    /* NULL for FRAME_CRS; frame.c */
     bool fans;             /* the strip goes round the centres of blocks */
     int64_t max_vertices;  /* 0: any number */
     double achieved_eps;   /* of the mesh: eps, or more to keep within max_vertices; known after request_patch */
@@ -96,6 +100,19 @@ int request_region(const request *r, const rqt_geometry *geometry, const char *w
 /* The rule of what the options detail and mode want, when terrain and region are known. detail.c */
 int rule_read(request *r, char **error);
 void rule_free(request *r);
+/* Of the coordinates that the answer has: the terrain's, 4978 for geocentric ones, 0 for local ones. */
+int32_t request_srid(const request *r);
+/* What the option frame wants, when all else is known: the rule is given what curvature takes. frame.c */
+int frame_read(request *r, char **error);
+void frame_free(space_frame *f);
+/* Vertices of the patch that are one in space become one; without a frame, or where there are none, nothing
+ * changes.
+ */
+int frame_merge(const space_frame *f, rqt_patch *patch);
+/* x,y,z of each vertex of the patch, to be released with sqlite3_free, also when it fails. */
+int frame_places(const space_frame *f, const rqt_patch *patch, double **xyz, char **error);
+/* The terrain's name and what the coordinates are, a line. */
+const char *frame_title(const space_frame *f);
 /* The terrain that a value names; NULL value: the only one. */
 int request_terrain(store *s, sqlite3_value *name, const store_terrain **terrain, char **error);
 /* "what must be a number ...": false and a sentence when the value is none, or NaN. */

@@ -11,34 +11,36 @@ typedef struct mesh {
     double factor; /* rqt_unit_factor */
     store *store;  /* lives as long as the table does */
     double achieved_eps;
+    double *xyz; /* of each vertex, in a frame of its own; NULL: the terrain's CRS */
 } mesh;
 
 static void release(void *data) {
     mesh *m = data;
     store_keep(m->store, &m->patch);
+    sqlite3_free(m->xyz);
     sqlite3_free(m);
 }
 
 /* As format_coordinates says them, but only the one. */
-static void put_coordinate(const mesh *m, uint32_t vertex, int which, sqlite3_context *result) {
+static double coordinate(const mesh *m, uint32_t vertex, int which) {
     const rqt_patch_vertex *v = &m->patch.vertices[vertex];
     const rqt_placement *at = &m->frame.placement;
     const rqt_unit *unit = &m->frame.unit;
-    double value;
-    if (which == 0)
-        value = at->x0 + v->col * at->dx;
-    else if (which == 1)
-        value = at->y0 + v->row * at->dy;
-    else
-        value = ((double)unit->z0 + (double)v->q / (double)unit->d) * m->factor + unit->offset;
-    sqlite3_result_double(result, value);
+    if (m->xyz) return m->xyz[3 * (size_t)vertex + (size_t)which];
+    if (which == 0) return at->x0 + v->col * at->dx;
+    if (which == 1) return at->y0 + v->row * at->dy;
+    return ((double)unit->z0 + (double)v->q / (double)unit->d) * m->factor + unit->offset;
+}
+
+static void put_coordinate(const mesh *m, uint32_t vertex, int which, sqlite3_context *result) {
+    sqlite3_result_double(result, coordinate(m, vertex, which));
 }
 
 /* A vertex as POINT Z, or the three of a triangle as POLYGON Z, in GeoPackage's bytes. */
 static void put_geometry(const mesh *m, const uint32_t *vertices, int count, sqlite3_context *result) {
     double xyz[3][3];
     uint8_t bytes[FORMAT_TRIANGLE_BYTES];
-    for (int i = 0; i < count; i++) format_coordinates(&m->frame, &m->patch.vertices[vertices[i]], xyz[i]);
+    for (int i = 0; i < 3 * count; i++) xyz[i / 3][i % 3] = coordinate(m, vertices[i / 3], i % 3);
     const size_t size = count == 1 ? format_point_gpkg(xyz[0], m->frame.srid, bytes)
                                    : format_triangle_gpkg((const double(*)[3])xyz, m->frame.srid, bytes);
     sqlite3_result_blob(result, bytes, (int)size, SQLITE_TRANSIENT);
@@ -55,11 +57,15 @@ static int make_mesh(connection *c, sqlite3_value **arguments, rqt_product produ
     if (m) {
         memset(m, 0, sizeof *m);
         m->frame =
-            (format_frame){.placement = r.terrain->placement, .unit = r.terrain->unit, .srid = r.terrain->srid};
+            (format_frame){.placement = r.terrain->placement, .unit = r.terrain->unit, .srid = request_srid(&r)};
         m->factor = rqt_unit_factor(&m->frame.unit);
         m->store = r.store;
         code = request_patch(&r, product, &m->patch, NULL, error);
         m->achieved_eps = r.achieved_eps;
+        if (code == SQLITE_OK && r.frame) {
+            code = frame_merge(r.frame, &m->patch);
+            if (code == SQLITE_OK) code = frame_places(r.frame, &m->patch, &m->xyz, error);
+        }
     }
     request_free(&r);
     if (code != SQLITE_OK) {

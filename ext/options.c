@@ -22,7 +22,7 @@ static const choice choices[] = {
     {"max_vertices", "#", ""},
     {"max_triangles", "", "*"},
     {"previous", "", "*"},
-    {"frame", "", "*"},
+    {"frame", " crs ecef enu ", ""},
     {"test", "", "*"},
 };
 
@@ -73,6 +73,7 @@ static int read_one(const cJSON *item, request *r, char **error) {
         r->border = strcmp(value, "border") == 0;
         r->whole = strcmp(value, "cut") != 0;
     }
+    if (strcmp(c->key, "frame") == 0) r->frame_kind = (frame_kind)index_of(c, value);
     if (strcmp(c->key, "strip") == 0) r->fans = strcmp(value, "fan") == 0;
     return SQLITE_OK;
 }

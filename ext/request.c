@@ -90,6 +90,7 @@ int request_read(connection *c, sqlite3_value *region, sqlite3_value *eps, sqlit
     if (code == SQLITE_OK) code = request_terrain(r->store, terrain, &r->terrain, error);
     if (code == SQLITE_OK) code = read_region(r, region, error);
     if (code == SQLITE_OK) code = rule_read(r, error);
+    if (code == SQLITE_OK) code = frame_read(r, error);
     if (code != SQLITE_OK) request_free(r);
     return code;
 }
@@ -108,7 +109,12 @@ int request_patch(request *r, rqt_product product, rqt_patch *patch, store_reads
     return status == RQT_OK ? SQLITE_OK : SQLITE_NOMEM;
 }
 
+int32_t request_srid(const request *r) {
+    return r->frame_kind == FRAME_CRS ? r->terrain->srid : r->frame_kind == FRAME_ECEF ? 4978 : 0;
+}
+
 void request_free(request *r) {
+    frame_free(r->frame);
     rule_free(r);
     rqt_region_free(r->region);
     rqt_geometry_free(r->geometry);

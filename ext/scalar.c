@@ -73,15 +73,44 @@ static int own_format(const request *r, const rqt_patch *patch, rqt_mesh_kind ki
     return code;
 }
 
-static int other_format(const request *r, const rqt_patch *patch, format_kind kind, const float *normals,
-                        uint8_t **bytes, size_t *size, char **error) {
+static void framed_coordinates(const void *context, size_t vertex, double xyz[3]) {
+    memcpy(xyz, (const double *)context + 3 * vertex, 3 * sizeof *xyz);
+}
+
+/* In a frame of its own: geocentric has an SRID, east-north-up has none. */
+static int framed_format(const request *r, rqt_patch *patch, format_kind kind, uint8_t **bytes, size_t *size,
+                         rqt_status *status, char **error) {
+    double *xyz = NULL;
+    int code = frame_merge(r->frame, patch);
+    if (code == SQLITE_OK) code = frame_places(r->frame, patch, &xyz, error);
+    const format_mesh mesh = {.vertex_count = patch->vertex_count,
+                              .triangle_count = patch->triangle_count,
+                              .triangles = patch->triangles,
+                              .coordinates = framed_coordinates,
+                              .context = xyz,
+                              .srid = request_srid(r),
+                              .title = frame_title(r->frame),
+                              .eps = r->achieved_eps};
+    if (code == SQLITE_OK) *status = format_write(&mesh, kind, store_allocator(), bytes, size);
+    sqlite3_free(xyz);
+    return code;
+}
+
+static int other_format(const request *r, rqt_patch *patch, format_kind kind, const float *normals, uint8_t **bytes,
+                        size_t *size, char **error) {
     const format_frame frame = {.placement = r->terrain->placement,
                                 .unit = r->terrain->unit,
                                 .srid = r->terrain->srid,
                                 .title = r->terrain->name,
                                 .eps = r->achieved_eps,
                                 .normals = normals};
-    const rqt_status status = format_patch(patch, &frame, kind, store_allocator(), bytes, size);
+    rqt_status status = RQT_OK;
+    if (!r->frame) {
+        status = format_patch(patch, &frame, kind, store_allocator(), bytes, size);
+    } else {
+        const int code = framed_format(r, patch, kind, bytes, size, &status, error);
+        if (code != SQLITE_OK) return code;
+    }
     if (status == RQT_OK) return SQLITE_OK;
     if (status == RQT_NO_MEMORY) return SQLITE_NOMEM;
     return fail(error, "the mesh is larger than 2 GiB in this format; ask for less or a larger eps");
@@ -92,25 +121,25 @@ typedef struct mesh_format {
     enum { MESH_STRIP, MESH_INDEXED, MESH_WIRE, MESH_OTHER } family;
     format_kind kind; /* of MESH_OTHER */
     bool normals;
+    char name[16]; /* without "+normals"; cut where it is none of ours */
 } mesh_format;
 
 static int read_format(sqlite3_value *value, mesh_format *f, char **error) {
     static const char *const own[] = {"strip", "indexed", "rqt"};
     static const char with_normals[] = "+normals";
     const char *text = sqlite3_value_type(value) == SQLITE_TEXT ? (const char *)sqlite3_value_text(value) : "";
-    char name[16];
     if (!text) return SQLITE_NOMEM;
     const size_t length = strlen(text), suffix = sizeof with_normals - 1;
-    *f =
-        (mesh_format){MESH_OTHER, FORMAT_OBJ, length > suffix && strcmp(text + length - suffix, with_normals) == 0};
-    sqlite3_snprintf(sizeof name, name, "%.*s", (int)(f->normals ? length - suffix : length), text);
+    const bool normals = length > suffix && strcmp(text + length - suffix, with_normals) == 0;
+    *f = (mesh_format){MESH_OTHER, FORMAT_OBJ, normals, ""};
+    sqlite3_snprintf(sizeof f->name, f->name, "%.*s", (int)(normals ? length - suffix : length), text);
     for (int i = 0; i < 3; i++)
-        if (strcmp(name, own[i]) == 0) f->family = i;
-    if (strcmp(name, "glb") == 0) return fail(error, "format \"%s\" is not in this version", text);
-    if (f->family == MESH_OTHER && !format_from_name(name, &f->kind))
+        if (strcmp(f->name, own[i]) == 0) f->family = i;
+    if (strcmp(f->name, "glb") == 0) return fail(error, "format \"%s\" is not in this version", text);
+    if (f->family == MESH_OTHER && !format_from_name(f->name, &f->kind))
         return fail(error, "unknown format \"%s\"; there are strip indexed rqt obj ply wkb gpkg spatialite", text);
     if (f->normals && f->family != MESH_WIRE && f->kind != FORMAT_PLY)
-        return fail(error, "format \"%s\" has no normals; ply and rqt have", name);
+        return fail(error, "format \"%s\" has no normals; ply and rqt have", f->name);
     return SQLITE_OK;
 }
 
@@ -144,6 +173,11 @@ void call_mesh(sqlite3_context *result, int count, sqlite3_value **arguments) {
     if (code == SQLITE_OK)
         code = request_read(sqlite3_user_data(result), arguments[0], arguments[1], count > 3 ? arguments[3] : NULL,
                             count > 4 ? arguments[4] : NULL, &r, &error);
+    if (code == SQLITE_OK && r.frame && f.family != MESH_OTHER)
+        code =
+            fail(&error, "format \"%s\" holds samples, not points in space: option \"frame\" must be crs", f.name);
+    if (code == SQLITE_OK && r.frame && f.normals)
+        code = fail(&error, "normals are those of the terrain's CRS: option \"frame\" must be crs");
     if (code == SQLITE_OK)
         code = f.family == MESH_WIRE ? wire_mesh(&r, f.normals, &bytes, &size, &error)
                                      : patch_mesh(&r, &f, &bytes, &size, &error);

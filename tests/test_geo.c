@@ -405,6 +405,100 @@ static void ellipsoids_are_read_out_of_wkt(void **state) {
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) assert_false(geo_ellipsoid_of_wkt(bad[i], &e));
 }
 
+/* ------------------------------------------------------------------------------------- areas and paths */
+
+/* The planimetric area of triangles, with their straight sides as many short geodesics, by PROJ. */
+static void planimetric_areas_are_those_of_geodesic_polygons(void **state) {
+    (void)state;
+    start_dice(14);
+    const geo_ellipsoid wgs84 = GEO_WGS84;
+    for (int n = 0; n < 30; n++) {
+        double c[3][3];
+        const double size = n % 3 == 0 ? 0.001 : n % 3 == 1 ? 1 : 20, lon = dice(-180, 180), lat = dice(-60, 60);
+        for (int i = 0; i < 3; i++) {
+            c[i][0] = lon + dice(-size, size);
+            c[i][1] = lat + dice(-size, size);
+            c[i][2] = dice(-100, 4000);
+        }
+        struct geod_polygon polygon;
+        geod_polygon_init(&polygon, 0);
+        enum { PARTS = 1000 };
+        for (int i = 0; i < 3; i++)
+            for (int k = 0; k < PARTS; k++) {
+                const double t = k / (double)PARTS, *a = c[i], *b = c[(i + 1) % 3];
+                geod_polygon_addpoint(&earth, &polygon, a[1] + t * (b[1] - a[1]), a[0] + t * (b[0] - a[0]));
+            }
+        double area;
+        geod_polygon_compute(&earth, &polygon, 0, 1, &area, NULL);
+        const geo_measure m = geo_measure_triangle(&wgs84, (const double(*)[3])c);
+        if (fabs(m.planimetric - fabs(area)) > 1e-6 * fabs(area) + 0.01)
+            fail_msg("size %g at %g: %.12g, PROJ %.12g", size, lat, m.planimetric, fabs(area));
+        assert_true(m.surface >= m.planimetric * (1 - 100 / 6.3e6) * (1 - 1e-9));
+    }
+}
+
+/* Points of a path lie on the geodesic at their distance, pieces are within a thousandth of a cell. */
+static void paths_follow_geodesics(void **state) {
+    (void)state;
+    start_dice(15);
+    const geo_ellipsoid wgs84 = GEO_WGS84;
+    for (int n = 0; n < 40; n++) {
+        double line[6];
+        const double size = n % 2 ? 3 : 60, cell = n % 2 ? 1.0 / 1200 : 0.5;
+        line[0] = dice(-180, 180), line[1] = dice(-65, 65);
+        for (int i = 2; i < 6; i += 2) {
+            line[i] = line[i - 2] + dice(-size, size);
+            line[i + 1] = fmax(-84, fmin(84, line[i - 1] + dice(-size, size)));
+        }
+        geo_path p;
+        const size_t three = 3;
+        char message[200] = "";
+        assert_int_equal(geo_path_create(&wgs84, line, &three, 1, cell, -cell, &p, message, sizeof message),
+                         GEO_OK);
+        assert_int_equal(p.lines, 1);
+        assert_int_equal(p.line_points[0], p.points);
+        int own = -1;
+        struct geod_geodesicline along;
+        double begun = 0, worst = 0;
+        for (size_t i = 0; i < p.points; i++) {
+            const double *at = p.lonlat + 2 * i;
+            assert_int_equal(p.ends[i] != 0, i + 1 == p.points);
+            if (p.own[i]) {
+                own++;
+                assert_true(distance(at[0], at[1], line[2 * own], line[2 * own + 1]) < 1e-6);
+                begun = p.metres[i];
+                if (own < 2)
+                    geod_inverseline(&along, &earth, line[2 * own + 1], line[2 * own], line[2 * own + 3],
+                                     line[2 * own + 2], GEOD_DISTANCE_IN | GEOD_LATITUDE | GEOD_LONGITUDE);
+            }
+            if (i + 1 == p.points) break;
+            assert_true(p.metres[i + 1] > p.metres[i]);
+            for (int k = 1; k < 8; k++) {
+                const double s = p.metres[i] + (p.metres[i + 1] - p.metres[i]) * k / 8 - begun;
+                double y, x;
+                geod_position(&along, s, &y, &x, NULL);
+                x = at[0] + remainder(x - at[0], 360);
+                const double ux = at[2] - at[0], uy = at[3] - at[1], vx = x - at[0], vy = y - at[1];
+                worst = fmax(worst, fabs(ux * vy - uy * vx) / hypot(ux, uy) / cell);
+            }
+        }
+        assert_int_equal(own, 2);
+        if (worst > GEO_PATH_TOLERANCE) fail_msg("off by %g of a cell", worst);
+        geo_path_free(&p);
+    }
+    geo_path p;
+    char message[200] = "";
+    const double off[] = {0, 0, 0, 91}, wide[] = {0, 0, 1e9, 0}, world[] = {0, 50, 179, 50};
+    const size_t two = 2;
+    assert_int_equal(geo_path_create(&wgs84, off, &two, 1, 1, 1, &p, message, sizeof message), GEO_REFUSED);
+    assert_non_null(strstr(message, "latitude"));
+    assert_int_equal(geo_path_create(&wgs84, wide, &two, 1, 1, 1, &p, message, sizeof message), GEO_REFUSED);
+    assert_non_null(strstr(message, "longitude"));
+    assert_int_equal(geo_path_create(&wgs84, world, &two, 1, 1e-13, 1e-13, &p, message, sizeof message),
+                     GEO_REFUSED);
+    assert_non_null(strstr(message, "too long"));
+}
+
 static void test_version(void **state) {
     (void)state;
     int major = 0, minor = 0;
@@ -427,6 +521,8 @@ int main(void) {
         cmocka_unit_test(F28_corridors_over_a_pole_hold_it),
         cmocka_unit_test(what_is_no_corridor_is_refused),
         cmocka_unit_test(ellipsoids_are_read_out_of_wkt),
+        cmocka_unit_test(planimetric_areas_are_those_of_geodesic_polygons),
+        cmocka_unit_test(paths_follow_geodesics),
         cmocka_unit_test(test_version),
     };
     return cmocka_run_group_tests(tests, set_up, NULL);

@@ -204,7 +204,199 @@ def F25_profiles_across_the_antimeridian(db):
           abs(pole[-1][0] - vincenty(10, 88, -170, 88)) < 1e-3, pole[-1])
 
 
+# --------------------------------------------------------------------------------------------------------------------- areas
+
+UTM = ('PROJCS["WGS 84 / UTM zone 32N",GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],'
+       'PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],'
+       'PARAMETER["latitude_of_origin",0],PARAMETER["central_meridian",9],PARAMETER["scale_factor",0.9996],'
+       'PARAMETER["false_easting",500000],PARAMETER["false_northing",0],UNIT[%s],AUTHORITY["EPSG","32632"]]')
+METRE, FOOT = '"metre",1', '"US survey foot",0.304800609601219'
+
+
+def near(name, seen, expected, relative=1e-12):
+    seen = seen if isinstance(seen, tuple) else (seen,)
+    return check(name, all(abs(a - b) <= relative * max(abs(b), 1e-300) for a, b in zip(seen, expected)) and len(seen) == len(expected),
+                 "%r instead of %r" % (seen, expected))
+
+
+def clip(polygon, a, b):
+    """What of a convex polygon of (x,y,z) lies to the left of a-b."""
+    out = []
+    for p, q in zip(polygon, polygon[1:] + polygon[:1]):
+        sp, sq = cross(a, b, p), cross(a, b, q)
+        if sp >= 0:
+            out.append(p)
+        if sp * sq < 0:
+            t = sp / (sp - sq)
+            out.append(tuple(p[i] + t * (q[i] - p[i]) for i in range(3)))
+    return out
+
+
+def areas_in_the_plane():
+    path = temp("areas.gpkg")
+    n = 33
+    plane = [[3 * i + 2 * j + 100 for i in range(n)] for j in range(n)]
+    cone = [[int(500 - 10 * math.hypot(i - 16, j - 16)) for i in range(n)] for j in range(n)]
+    import_terrain(path, write_grid(temp("tilt.asc"), plane, x0=4e5, y0=5e6, cell=10, crs=UTM % METRE), name="tilt")
+    import_terrain(path, write_grid(temp("feet.asc"), plane, x0=4e5, y0=5e6, cell=10, crs=UTM % FOOT), name="feet")
+    import_terrain(path, write_grid(temp("cone.asc"), cone), name="cone", block=2)
+    import_terrain(path, write_grid(temp("voids.asc"), rough_grid(14, 12, SEED, voids=60)), name="voids", block=2)
+    db = connect(path)
+    side = 320.0
+    slope = math.sqrt(1 + 0.3 ** 2 + 0.2 ** 2)
+    for eps in (0, 1000):
+        near("areas: a tilted plane, eps %d" % eps, one(db, "SELECT * FROM rqt_area(NULL, ?, 'tilt')", eps),
+             (side ** 2, side ** 2 * slope, side ** 2 * 180))
+    foot = 1200 / 3937
+    near("areas: feet on the ground, metres of height", one(db, "SELECT * FROM rqt_area(NULL, 0, 'feet')"),
+         ((side * foot) ** 2, (side * foot) ** 2 * math.sqrt(1 + (0.3 / foot) ** 2 + (0.2 / foot) ** 2), (side * foot) ** 2 * 180),
+         1e-11)
+    # a region's own area, whatever the triangles; its corners are rounded to 2^-20 sample
+    x, y = 400003.25, 5000001.5
+    near("areas: of the region itself", one(db, "SELECT planimetric, volume FROM rqt_area(rqt_bbox(?, ?, ? + 101.5, ? + 33.25), "
+                                            "0, 'tilt')", x, y, x, y),
+         (101.5 * 33.25, 101.5 * 33.25 * (100 + 0.3 * (x + 50.75 - 4e5) + 0.2 * (5e6 + 320 - y - 33.25 / 2))), 1e-6)
+    near("areas: whole triangles when the mode is cover",
+         one(db, "SELECT planimetric FROM rqt_area('POINT(400001 5000002)', 0, 'tilt', '{\"mode\":\"cover\"}')"), (side ** 2 / 2,))
+    for name, eps in (("cone", 0), ("cone", 5), ("voids", 0), ("voids", 12)):
+        triangles = mesh(db, eps, name)
+        a, b, c = (2.5, -9.25), (11.75, -7.5), (6.125, -1.25)
+        total = [0.0, 0.0, 0.0]
+        for t in triangles:
+            polygon = clip(clip(clip(list(t), a, b), b, c), c, a)
+            for q, r in zip(polygon[1:], polygon[2:]):
+                p = polygon[0]
+                u, v = [q[i] - p[i] for i in range(3)], [r[i] - p[i] for i in range(3)]
+                n3 = (u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0])
+                total[0] += n3[2] / 2
+                total[1] += math.sqrt(sum(k * k for k in n3)) / 2
+                total[2] += n3[2] / 6 * (p[2] + q[2] + r[2])
+        near("areas: a triangle on %s at %d, triangle by triangle" % (name, eps),
+             one(db, "SELECT * FROM rqt_area(?, ?, ?)", "POLYGON((%r %r, %r %r, %r %r, %r %r))" % (a + b + c + a), eps, name),
+             total, 1e-8)
+    equal("areas: outside", one(db, "SELECT * FROM rqt_area(rqt_bbox(-9, 1, -8, 2), 0, 'cone')"), (0.0, 0.0, 0.0))
+    raises("areas: eps is checked", "rqt_area(): eps must be 0 or more", lambda: one(db, "SELECT * FROM rqt_area(NULL, -1, 'cone')"))
+    db.enable_load_extension(True)
+    db.load_extension("mod_spatialite")
+    shape = "POLYGON((400020 5000030, 400290 5000011, 400200 5000300, 400020 5000030), (400180 5000050, 400200 5000060, 400190 5000090, 400180 5000050))"
+    seen, theirs = one(db, "SELECT a.planimetric, ST_Area(ST_GeomFromText(?)) FROM rqt_area(?, 0, 'tilt') a", shape, shape)
+    near("areas: SpatiaLite's ST_Area", (seen,), (theirs,), 1e-7)
+    db.close()
+
+
+def quarter(lat):
+    """The area from the equator to a latitude, per radian of longitude."""
+    e2 = F * (2 - F)
+    e, s = math.sqrt(e2), math.sin(math.radians(lat))
+    return (A * (1 - F)) ** 2 / 2 * (s / (1 - e2 * s * s) + math.atanh(e * s) / e)
+
+
+def areas_on_the_ellipsoid():
+    path = temp("shell.gpkg")
+    import_terrain(path, write_grid(temp("shell.asc"), [[2000] * 361 for _ in range(181)], x0=-180, y0=-90, crs=WGS84), name="shell",
+                   block=4)
+    import_terrain(path, write_grid(temp("sea.asc"), [[0] * 361 for _ in range(181)], x0=0, y0=-90, crs=WGS84), name="sea", block=4)
+    db = connect(path)
+    whole = 4 * math.pi * quarter(90)
+    seen = one(db, "SELECT * FROM rqt_area(NULL, 0, 'sea')")
+    near("areas: the Earth at height 0", seen, (whole, whole, 0))
+    near("areas: the Earth as GeographicLib has it", seen[:1], (510065621724088.5,))
+    # Steiner: what is parallel to the ellipsoid at h, by its integral of mean curvature (2 pi (b + a^2/c asin(c/a)) for an oblate)
+    h, b = 2000.0, A * (1 - F)
+    c = math.sqrt(A * A - b * b)
+    mean = 2 * math.pi * (b + A * A / c * math.asin(c / A))
+    near("areas: a shell of 2 km about the Earth", one(db, "SELECT * FROM rqt_area(NULL, 0, 'shell')"),
+         (whole, whole + 2 * h * mean + 4 * math.pi * h * h, whole * h + h * h * mean + 4 / 3 * math.pi * h ** 3))
+    for w, s, e, n in ((3, 40.25, 17.5, 51), (-20, -90, 20, -60.5)):
+        near("areas: a zone's part from %g to %g" % (s, n),
+             one(db, "SELECT planimetric FROM rqt_area(rqt_bbox(?, ?, ?, ?), 0, 'sea')", w, s, e, n),
+             (math.radians(e - w) * (quarter(n) - quarter(s)),), 1e-10)
+    near("areas: a circle", one(db, "SELECT planimetric FROM rqt_area(rqt_circle(30, 50, 20000), 0, 'sea')"),
+         (math.pi * 20000 ** 2 * math.sin(2 * math.pi / 256) * 128 / math.pi,), 1e-5)
+    near("F28 areas: a polar cap", one(db, "SELECT planimetric FROM rqt_area(rqt_circle(0, 90, 111693.8647), 0, 'sea')"),
+         (2 * math.pi * (quarter(90) - quarter(89)),), 2e-4)
+    near("F25 areas: a box across the antimeridian",
+         one(db, "SELECT planimetric FROM rqt_area(rqt_bbox(175, -5, -170, 5, 4326), 0, 'shell')"),
+         (math.radians(15) * 2 * quarter(5),), 1e-10)
+    db.close()
+
+
+# ----------------------------------------------------------------------------------------------------------- regions, wrapped
+
+def regions_on_every_turn(db):
+    """A region is where it is, modulo 360: the answers are the terrain's own coordinates."""
+    path = temp("pacific.gpkg")
+    grid = [[round(100 * math.sin(i / 7) + 80 * math.cos(j / 5) + dice.below(40) + 0.25 * (i % 4), 2) for i in range(73)]
+            for j in range(37)]
+    import_terrain(path, write_grid(temp("pacific.asc"), grid, x0=0, y0=-90, cell=5, crs=WGS84), name="pacific", block=3)
+    other = connect(path)
+
+    def triangles(base, terrain, region):
+        return sorted(r[1:] for r in rows(base, "SELECT * FROM rqt_triangles(%s, 20, ?)" % region, terrain))
+
+    for base, terrain, pairs in (
+            (db, "globe", (("rqt_bbox(190, -10, 200, 10)", "rqt_bbox(-170, -10, -160, 10)"),
+                           ("rqt_bbox(-370, 0, -350, 5)", "rqt_bbox(-10, 0, 10, 5)"),
+                           ("'MULTIPOLYGON(((170 -10, 180 -10, 180 10, 170 10, 170 -10)),((-180 -10, -170 -10, -170 10, -180 10, -180 -10)))'",
+                            "rqt_bbox(170, -10, 190, 10)"),
+                           ("rqt_bbox(170, -10, -170, 10, 4326)", "rqt_bbox(170, -10, 190, 10)"),
+                           ("rqt_bbox(530, -10, 550, 10)", "rqt_bbox(170, -10, 190, 10)"))),
+            (other, "pacific", (("rqt_bbox(-170, -20, -150, 20)", "rqt_bbox(190, -20, 210, 20)"),
+                                ("rqt_bbox(-20, 40, 20, 50)",
+                                 "'MULTIPOLYGON(((340 40, 360 40, 360 50, 340 50, 340 40)),((0 40, 20 40, 20 50, 0 50, 0 40)))'"),
+                                ("rqt_bbox(20, -5, -20, 5, 4326)",
+                                 "rqt_bbox(20, -5, 340, 5)")))):
+        for a, b in pairs:
+            seen = triangles(base, terrain, a)
+            check("F25 regions on %s: %s" % (terrain, a), seen == triangles(base, terrain, b) and seen, len(seen))
+    low, high = one(other, "SELECT min(x), max(x) FROM rqt_range(rqt_bbox(-20, 40, 20, 50), 20)")
+    check("F25 regions: coordinates are never wrapped", (low, high) == (0, 360), (low, high))
+    both = rows(db, "SELECT DISTINCT x FROM rqt_range('POINT(180 7)', 0, 'globe') ORDER BY x")
+    check("F25 regions: a terrain that has a meridian twice answers both", both[0][0] == -180 and both[-1][0] == 180, both)
+    for x, y in ((190.25, 3.5), (-169.75, 3.5), (550.25, 3.5)):
+        equal("heights on every turn: %g" % x, one(db, "SELECT rqt_height(?, ?, 0, 'globe')", x, y),
+              one(db, "SELECT rqt_height(-169.75, ?, 0, 'globe')", y))
+        equal("heights on every turn, 0..360: %g" % x, one(other, "SELECT rqt_height(?, ?)", x, y),
+              one(other, "SELECT rqt_height(190.25, ?)", y))
+    raises("F25 a box from east to west without SRID", "rqt_bbox(): x0 is greater than x1", lambda: one(db, "SELECT rqt_bbox(170, 0, -170, 1)"))
+    raises("F25 a box upside down", "rqt_bbox(): y0 is greater than y1", lambda: one(db, "SELECT rqt_bbox(170, 2, -170, 1, 4326)"))
+    # F28: a circle that holds a pole holds all meridians
+    for lat, pole in ((89.2, 90), (-88.9, -90), (90, 90)):
+        seen = one(db, "SELECT count(DISTINCT x) > 90, min(x), max(x) FROM rqt_range(rqt_circle(100, ?, 400000), 0, 'globe') WHERE y = ?",
+                   lat, pole)
+        equal("F28 a circle over the pole, from %g" % lat, seen, (1, -180.0, 180.0))
+    v = rows(db, "SELECT samples, max_error, t_junctions, overlaps, uncovered FROM rqt_verify(rqt_circle(100, 88, 400000), 50, 'globe')")[0]
+    check("F28 a circle over the pole is a sound patch", v[0] > 1000 and v[1] <= 50 and v[2:] == (0, 0, 0), v)
+    v = rows(db, "SELECT samples, max_error, t_junctions, overlaps, uncovered FROM rqt_verify(rqt_corridor("
+             "'LINESTRING(170 50, -170 60)', 300000), 50, 'globe')")[0]
+    check("F25 a corridor across the antimeridian is a sound patch", v[0] > 100 and v[1] <= 50 and v[2:] == (0, 0, 0), v)
+    other.close()
+
+
+def corridors(db):
+    text = "'LINESTRING(-71.4 44.2, -71.3 44.27, -71.35 44.31)'"
+    db.load_extension("mod_spatialite")
+    for cast in (text, "ST_GeomFromText(%s, 4326)" % text, "AsGPB(ST_GeomFromText(%s, 4326))" % text, "'SRID=4326;' || " + text):
+        equal("corridors: of %.40s" % cast, one(db, "SELECT hex(rqt_corridor(%s, 300)) = hex(rqt_corridor(%s, 300))" % (cast, text)), 1)
+    spatial = connect()
+    spatial.load_extension("mod_spatialite")
+    spatial.execute("SELECT InitSpatialMetaData(1, 'WGS84_ONLY')")
+    valid, area = one(spatial, "SELECT ST_IsValid(GeomFromGPB(g)), ST_Area(GeomFromGPB(g), 1) FROM (SELECT rqt_corridor(%s, 300) AS g)"
+                      % text)
+    spatial.close()
+    check("corridors: valid for SpatiaLite", valid == 1, valid)
+    mine = one(db, "SELECT planimetric FROM rqt_area(rqt_corridor(%s, 300), 50, 'land')" % text)
+    near("corridors: SpatiaLite's geodesic area, as near as its method comes", mine, (area,), 1e-5)
+    for value, metres, sentence in (("NULL", "1", "line must be WKT text or a geometry; it is NULL"), ("rqt_bbox(0,0,1,1)", "1", "polygon"),
+                                    (text, "NULL", "metres must be a number; it is NULL"), (text, "0", "radius"),
+                                    (text, "-5", "radius"), ("'SRID=3857;LINESTRING(0 0, 1 1)'", "1", "line must be in SRID 4326"),
+                                    ("'LINESTRING(0 0, 0 91)'", "1", "latitude")):
+        raises("corridors: %s, %s is refused" % (value[:30], metres), sentence, lambda: one(db, "SELECT rqt_corridor(%s, %s)" % (value, metres)))
+
+
 def main():
+    areas_in_the_plane()
+    areas_on_the_ellipsoid()
     profiles_in_the_plane()
     path = temp("earth.gpkg")
     import_terrain(path, os.path.join(os.path.dirname(DATA), "..", "examples", "N44W072.hgt.zip"), name="land")
@@ -212,6 +404,8 @@ def main():
     db = connect(path)
     profiles_on_the_ellipsoid(db)
     F25_profiles_across_the_antimeridian(db)
+    regions_on_every_turn(db)
+    corridors(db)
     finish()
 
 

@@ -119,6 +119,9 @@ for name, source, eps in (("africa", "eastafrica.tif", 400), ("the globe", "etop
         lon, lat = degrees_in_metres(y0 + row * dy)
         return (0 if abs(abs(y0 + row * dy) - 90) < 1e-9 else dx * lon), dy * lat
     compare(name, db, z, metres_in, None, eps)
+    for form, why in (("ply", "normals are those of the terrain's CRS"), ("rqt", 'format "rqt" holds samples')):
+        raises("%s: no normals in another frame (%s)" % (name, form), "rqt_mesh(): " + why, lambda: one(
+            db, "SELECT rqt_mesh('POINT(32 1)', 100, ?, NULL, '{\"frame\": \"enu\"}')", form + "+normals"))
     if name == "the globe":
         poles = {v: n for v, n in ply_normals(one(db, "SELECT rqt_mesh(NULL, 2500, 'ply+normals')")).items() if abs(v[1]) == 90}
         check("at a pole nothing slopes east or west", len(poles) > 1 and all(n[0] == 0 for n in poles.values()), len(poles))

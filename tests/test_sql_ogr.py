@@ -148,6 +148,11 @@ for kind, path in databases.items():
 africa = s.temp("africa.gpkg")
 s.import_terrain(africa, AFRICA, name="africa")
 db = s.connect(africa)
+for frame, srid in (("ecef", 4978), ("enu", 0)):
+    options = '{"frame": "%s"}' % frame
+    expected = s.triangles(db, "POINT(30.01 0.02)", 100, None, options)
+    equal("frame %s: gpkg is where the triangle is, with its SRID" % frame, [(struct.unpack_from("<i", blob, 4)[0], geometry(blob, 40)[0]) for blob, in rows(
+        db, "SELECT gpkg FROM rqt_triangles('POINT(30.01 0.02)', 100, NULL, ?)", options)], [(srid or -1, ("POLYGON Z", t)) for t in expected])
 wanted = [("POLYGON Z", t) for t in s.triangles(db, "POINT(30.01 0.02)", 0) + s.triangles(db, "LINESTRING(31 1, 33 2)", 50)]
 db.close()
 check("coordinates that need 17 digits are among them", any(float("%.15g" % p[0]) != p[0] for w in wanted for p in points_of(w)))

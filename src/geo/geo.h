@@ -72,7 +72,7 @@ typedef struct geo_path {
 } geo_path;
 void geo_path_free(geo_path *path);
 #define GEO_PATH_TOLERANCE 1e-3 /* of a cell: the most that a piece is off its geodesic */
-#define GEO_PATH_POINTS 5000000
+#define GEO_PATH_POINTS 1000000
 /* cell_lon, cell_lat: a cell's sides, degrees. Longitudes go on as for geo_corridor. A geodesic over a pole goes
  * along it, latitude 90, from one meridian to the other. */
 int geo_path_create(const geo_ellipsoid *ellipsoid, const double *lonlat, const size_t *line_points, size_t lines,
@@ -86,6 +86,31 @@ typedef struct geo_measure {
 } geo_measure;
 /* Of a triangle with corners lon, lat, height above the ellipsoid, straight in all three: surface.cpp. */
 geo_measure geo_measure_triangle(const geo_ellipsoid *ellipsoid, const double lonlath[3][3]);
+
+/* ---------------------------------------------------------------------------------------------- frames --
+ * Places on WGS 84 as points in space: geocentric (EPSG:4978), or east, north, up about an origin on the ellipsoid.
+ */
+typedef enum geo_frame_kind { GEO_ECEF, GEO_ENU } geo_frame_kind;
+typedef struct geo_frame geo_frame;
+
+/* Where a grid of heights lies: degrees, steps of a sample in degrees, heights in metres. */
+typedef struct geo_extent {
+    double west, east, south, north, lon_step, lat_step, lowest, highest;
+} geo_extent;
+
+/* geoid: heights are above EGM96, which PROJ's grid egm96_15.gtx tells (refused when it is not there); else above
+ * the ellipsoid. The origin of GEO_ENU is (lon,lat), height 0. */
+int geo_frame_create(geo_frame_kind kind, double lon, double lat, int geoid, geo_frame **out, char *message,
+                     int message_size);
+void geo_frame_free(geo_frame *frame);
+/* Finite, unless the geoid has no value there. */
+void geo_frame_place(const geo_frame *frame, const double lonlath[3], double xyz[3]);
+
+/* How far a mesh in space may be from what it is in lon,lat,height: for each rank of split vertices (2 * scale for
+ * the midpoint of a side of 2^(scale+1) samples, 2 * scale + 1 for the centre of such a square), an upper bound, in
+ * metres, of the distance between any place of a triangle that is straight in lon,lat,height and the same place of
+ * the flat triangle with its corners: frame.cpp has the proof. Does not fall with rank. */
+void geo_frame_sag(const geo_frame *frame, const geo_extent *extent, int ranks, double *metres);
 
 /* GeographicLib's version, as text of static life. */
 const char *geo_version(void);

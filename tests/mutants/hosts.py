@@ -2,7 +2,7 @@
 
 MUTANTS = [
     # layers
-    ("hosts: a row's geometry has no SRID", "ext/mesh_tables.c", ".srid = r.terrain->srid};", ".srid = 0};",
+    ("hosts: a row's geometry has no SRID", "ext/mesh_tables.c", ".srid = request_srid(&r)};", ".srid = 0};",
      "test_sql_ogr.py", "CRS and extent"),
     ("hosts: a vertex's geometry says that it is empty", "src/format/geometry.c", "put_gpkg_head(bytes, GPKG_PLAIN",
      "put_gpkg_head(bytes, GPKG_EMPTY", "test_format", "test_point_gpkg"),
