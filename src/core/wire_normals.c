@@ -18,7 +18,8 @@
 enum { ZSTD_LEVEL = 3, STEPS = 127 };
 
 static int8_t step_of(double v) {
-    return (int8_t)rint(fmin(fmax(v, -1), 1) * STEPS);
+    const double within = !(v > -1) ? -1 : v > 1 ? 1 : v; /* no number is -1 */
+    return (int8_t)rint(within * STEPS);
 }
 
 void rqt_normal_pack(const float normal[3], int8_t packed[2]) {
@@ -30,7 +31,8 @@ void rqt_normal_pack(const float normal[3], int8_t packed[2]) {
 
 void rqt_normal_unpack(const int8_t packed[2], float normal[3]) {
     const double u = packed[0] / (double)STEPS, v = packed[1] / (double)STEPS;
-    const double x = (u + v) / 2, y = (u - v) / 2, z = 1 - fmax(fabs(u), fabs(v)); /* 1 - |x| - |y| */
+    const double x = (u + v) / 2, y = (u - v) / 2, far = fabs(u) > fabs(v) ? fabs(u) : fabs(v);
+    const double z = 1 - far; /* 1 - |x| - |y| */
     const double length = sqrt(x * x + y * y + z * z);
     normal[0] = (float)(x / length);
     normal[1] = (float)(y / length);
