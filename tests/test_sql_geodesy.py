@@ -6,8 +6,8 @@ import os
 import struct
 from fractions import Fraction
 
-from sql_support import (DATA, WGS84, Dice, check, connect, equal, finish, import_terrain, one, raises, rough_grid, rows, temp,
-                         write_grid)
+from sql_support import (DATA, WGS84, Dice, check, connect, equal, finish, import_terrain, one, raises, rough_grid, rows, run,
+                         temp, write_grid)
 
 SEED = int(os.environ.get("RQT_SEED", "41"))
 print("RQT_SEED=%d" % SEED)
@@ -394,9 +394,184 @@ def corridors(db):
         raises("corridors: %s, %s is refused" % (value[:30], metres), sentence, lambda: one(db, "SELECT rqt_corridor(%s, %s)" % (value, metres)))
 
 
+# -------------------------------------------------------------------------------------------------------------------- frames
+
+def ecef(lon, lat, h):
+    e2 = F * (2 - F)
+    # exact where it matters, at the poles and on the seam
+    sp, cp = (math.copysign(1, lat), 0.0) if abs(lat) == 90 else (math.sin(math.radians(lat)), math.cos(math.radians(lat)))
+    n = A / math.sqrt(1 - e2 * sp * sp)
+    return ((n + h) * cp * math.cos(math.radians(lon)), (n + h) * cp * math.sin(math.radians(lon)), (n * (1 - e2) + h) * sp)
+
+
+def dot(a, b):
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def minus(a, b):
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+def distance(p, t):
+    """Of a point from a triangle in space."""
+    a, b, c = t
+    u, v, w = minus(b, a), minus(c, a), minus(p, a)
+    n = (u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0])
+    uu, uv, vv, wu, wv = dot(u, u), dot(u, v), dot(v, v), dot(w, u), dot(w, v)
+    d = uu * vv - uv * uv
+    s, r = (vv * wu - uv * wv) / d, (uu * wv - uv * wu) / d
+    if s >= 0 and r >= 0 and s + r <= 1:
+        return abs(dot(w, n)) / math.sqrt(dot(n, n))
+    best = math.inf
+    for x, y in ((a, b), (b, c), (c, a)):
+        e, f = minus(y, x), minus(p, x)
+        k = max(0.0, min(1.0, dot(e, f) / dot(e, e)))
+        g = minus(f, (k * e[0], k * e[1], k * e[2]))
+        best = min(best, math.sqrt(dot(g, g)))
+    return best
+
+
+def prove_in_space(db, eps, terrain, heights, place, frame="ecef", region="NULL"):
+    """The largest distance of a sample from the triangle over it, the longest edge, and what does not close."""
+    options = '{"frame":"%s"}' % frame
+    spot = {r[:3]: r[3:] for r in rows(db, "SELECT x, y, z, col, row FROM rqt_range(%s, ?, ?, ?)" % region, eps, terrain, options)}
+    triangles = [(r[1:4], r[4:7], r[7:10]) for r in rows(db, "SELECT * FROM rqt_triangles(%s, ?, ?, ?)" % region, eps, terrain, options)]
+    width, last = len(heights[0]), len(heights) - 1
+    worst = longest = 0.0
+    edges, seen, polar = {}, set(), []
+    for t in triangles:
+        for i in range(3):
+            edge = t[i], t[(i + 1) % 3]
+            edges[edge] = edges.get(edge, 0) + 1
+            longest = max(longest, math.sqrt(dot(minus(*edge), minus(*edge))))
+        c = [spot[v] for v in t]
+        if place(*c[0])[1] in (90, -90) or place(*c[1])[1] in (90, -90) or place(*c[2])[1] in (90, -90):
+            polar.append(t)
+            continue
+        if max(v[0] for v in c) - min(v[0] for v in c) > width // 2 and place(width - 1, 0)[0] - place(0, 0)[0] == 360:
+            c = [(v[0] + (width - 1 if v[0] == 0 else 0), v[1]) for v in c]
+        for row in range(min(v[1] for v in c), max(v[1] for v in c) + 1):
+            for col in range(min(v[0] for v in c), max(v[0] for v in c) + 1):
+                w = [cross(c[i], c[(i + 1) % 3], (col, row)) for i in range(3)]
+                if max(w) <= 0 and heights[row][col] is not None:
+                    worst = max(worst, distance(ecef(*place(col, row), heights[row][col]), t))
+                    seen.add((col, row))
+    lone = sum(edges.get((b, a), 0) != n or n != 1 for (a, b), n in edges.items())
+    return worst, longest, lone, len(triangles), len(spot), seen, polar, len(edges)
+
+
+def frames():
+    path = temp("space.gpkg")
+    flat = [[500] * 65 for _ in range(65)]
+    hills = [[int(900 + 300 * math.sin(i / 11) * math.cos(j / 13) + dice.below(3)) for i in range(129)] for j in range(129)]
+    wide = [[int(1500 + 1500 * math.sin(i / 9) * math.cos(j / 7)) for i in range(65)] for j in range(65)]
+    second, ends = 1 / 3600, []
+    grids = {"flat": (flat, 0.01, 8, 46), "tile": (hills, second, -71.5, 44.25), "wide": (wide, 0.25, 100, -60)}
+    for name, (grid, cell, x0, y0) in grids.items():
+        import_terrain(path, write_grid(temp(name + ".asc"), grid, x0=x0, y0=y0, cell=cell, crs=WGS84), name=name, block=3)
+    compound = ('COMPD_CS["WGS 84 + EGM96 height",%s,VERT_CS["EGM96 height",VERT_DATUM["EGM96 geoid",2005,AUTHORITY["EPSG","5171"]],'
+                'UNIT["metre",1,AUTHORITY["EPSG","9001"]],AXIS["Gravity-related height",UP],AUTHORITY["EPSG","5773"]]]' % WGS84)
+    import_terrain(path, write_grid(temp("geoid.asc"), hills, x0=8, y0=46, cell=0.02, crs=compound), name="geoid", block=3)
+    import_terrain(path, write_grid(temp("navd.asc"), flat, x0=8, y0=46, cell=0.01, crs=compound.replace("EGM96", "NAVD88")), name="navd")
+    import_terrain(path, os.path.join(DATA, "etopo1_1deg.tif"), name="globe", block=4)
+    db = connect(path)
+    for name, eps, most in (("flat", 1, 512), ("flat", 20, 32), ("tile", 3, 8000), ("tile", 8, 2400), ("wide", 500, 1024)):
+        grid, cell, x0, y0 = grids[name]
+        x, y, dx, dy = one(db, "SELECT x0, y0, dx, dy FROM rqt_terrains WHERE name = ?", name)
+        worst, longest, _, triangles, vertices, seen, _, _ = prove_in_space(db, eps, name, grid, lambda c, r: (x + c * dx, y + r * dy))
+        check("F29 %s: every sample within %g m in space" % (name, eps), worst <= eps and len(seen) == len(grid) * len(grid[0]),
+              (worst, longest, len(seen)))
+        ends.append(longest)
+        print("   %s at %g m: worst %.4g m, longest edge %.0f m, %d triangles" % (name, eps, worst, longest, triangles))
+        check("F29 %s: no more triangles than curvature needs at %g" % (name, eps), triangles <= most, triangles)
+    check("F29 edges from hundreds of metres to a hundred kilometres", min(ends) < 1500 and max(ends) > 1e5, ends)
+    grid, cell, x0, y0 = grids["flat"]
+    equal("F29 without curvature two triangles would do", one(db, "SELECT count(*) FROM rqt_triangles(NULL, 1, 'flat')"), 2)
+    # enu is ecef, turned and moved: the same mesh, the origin where the file says
+    a = rows(db, "SELECT x, y, z FROM rqt_range(NULL, 20, 'flat', '{\"frame\":\"enu\"}')")
+    b = rows(db, "SELECT x, y, z FROM rqt_range(NULL, 20, 'flat', '{\"frame\":\"ecef\"}')")
+    off = max(abs(math.dist(a[0], p) - math.dist(b[0], q)) for p, q in zip(a, b))
+    check("frame enu: the same shape as ecef", len(a) == len(b) and off < 1e-6, off)
+    text = one(db, "SELECT rqt_mesh(NULL, 20, 'obj', 'flat', '{\"frame\":\"enu\"}')")
+    check("frame enu: the file tells its origin", "# terrain flat, frame enu about longitude 8.32 latitude 46.32 height 0\n" in text, text[:90])
+    up = ecef(8.32, 46.32, 500)
+    middle = min(b, key=lambda p: math.dist(p, up))
+    check("frame enu: up is z", abs(a[b.index(middle)][2] - 500) < 1 and all(p[2] < 501 for p in a), a[b.index(middle)])
+    equal("frame ecef: obj has the vertices of rqt_range", text.count("\nv "), len(a))
+    blob = one(db, "SELECT rqt_mesh(NULL, 20, 'gpkg', 'flat', '{\"frame\":\"ecef\"}')")
+    equal("frame ecef: its SRID", struct.unpack("<i", blob[4:8])[0], 4978)
+    for form in ("strip", "indexed", "rqt"):
+        raises("frame: %s is refused" % form, "rqt_mesh(): format \"%s\" holds samples" % form,
+               lambda: one(db, "SELECT rqt_mesh(NULL, 20, ?, 'flat', '{\"frame\":\"enu\"}')", form))
+    strip = rows(db, "SELECT x, y, z FROM rqt_strip(NULL, 1, 'flat', '{\"frame\":\"ecef\"}')")
+    listed = {frozenset((r[1:4], r[4:7], r[7:10])) for r in rows(db, "SELECT * FROM rqt_triangles(NULL, 1, 'flat', '{\"frame\":\"ecef\"}')")}
+    equal("frame ecef: the strip has the same triangles", {frozenset(t) for t in zip(strip, strip[1:], strip[2:]) if len(set(t)) == 3}, listed)
+    # parts of one mesh
+    parts = [set(rows(db, "SELECT x0,y0,z0,x1,y1,z1,x2,y2,z2 FROM rqt_triangles(%s, 8, 'tile', '{\"frame\":\"ecef\"}')" % region))
+             for region in ("NULL", "rqt_bbox(-71.49, 44.26, -71.48, 44.27)", "rqt_bbox(-71.483, 44.26, -71.47, 44.27)")]
+    check("frame ecef: answers are parts of one mesh", parts[1] < parts[0] and parts[2] < parts[0] and parts[1] & parts[2])
+    # the geoid
+    x, y, dx, dy = one(db, "SELECT x0, y0, dx, dy FROM rqt_terrains WHERE name = 'geoid'")
+    some = rows(db, "SELECT x, y, z, col, row FROM rqt_range(NULL, 50, 'geoid', '{\"frame\":\"ecef\"}')")[::9]
+    given = "\n".join("%r %r %r" % (x + c * dx, y + r * dy, float(hills[r][c])) for _, _, _, c, r in some)
+    said, status = run(["gdaltransform", "-s_srs", "EPSG:4326+5773", "-t_srs", "EPSG:4978"], text=given)
+    theirs = [tuple(map(float, line.split())) for line in said.splitlines()]
+    off = max((math.dist(p[:3], q) for p, q in zip(some, theirs)), default=9)
+    check("frames: heights above EGM96, as gdaltransform has them", len(theirs) == len(some) and off < 1e-3, (off, said[:80]))
+
+    def undulated(c, r):
+        return x + c * dx, y + r * dy
+    said, status = run(["gdaltransform", "-s_srs", "EPSG:4326+5773", "-t_srs", "EPSG:4979"], text="\n".join(
+        "%r %r 0" % undulated(c, r) for r in range(129) for c in range(129)))
+    numbers = [float(line.split()[2]) for line in said.splitlines()]
+    under = [[hills[r][c] + numbers[129 * r + c] for c in range(129)] for r in range(129)]
+    for eps in (20,):
+        worst, longest, _, _, _, seen, _, _ = prove_in_space(db, eps, "geoid", under, undulated)
+        check("F29 above the geoid: every sample within %d m in space" % eps, worst <= eps and len(seen) == 129 * 129, (worst, longest))
+    empty = temp("no-proj")
+    os.mkdir(empty)
+    code = ("import sys; sys.path.insert(0, %r)\nfrom sql_support import *\ndb = connect(%r)\ntry:\n  one(db, \"SELECT count(*) FROM "
+            "rqt_range(NULL, 50, 'geoid', '{\\\"frame\\\":\\\"ecef\\\"}')\")\nexcept Exception as e: print(e)" % (os.path.dirname(os.path.abspath(__file__)), path))
+    said, status = run(["/usr/bin/python3", "-c", code], {"PROJ_DATA": empty, "PROJ_LIB": empty})
+    check("frames: without PROJ's grid, a sentence", "egm96_15.gtx" in said and "rqt_range(): option" in said, said)
+    raises("frames: other vertical datums are refused", 'the heights of terrain navd are "NAVD88 height"',
+           lambda: one(db, "SELECT count(*) FROM rqt_range(NULL, 50, 'navd', '{\"frame\":\"ecef\"}')"))
+    raises("frames: terrains that are not on WGS 84 are refused", "is for terrains in longitude and latitude on WGS 84",
+           lambda: one(connect(temp("areas.gpkg")), "SELECT count(*) FROM rqt_range(NULL, 50, 'tilt', '{\"frame\":\"ecef\"}')"))
+    raises("frames: an unknown one is refused", 'option "frame" has no value "mars"',
+           lambda: one(db, "SELECT count(*) FROM rqt_range(NULL, 50, 'flat', '{\"frame\":\"mars\"}')"))
+    equal("frames: crs is the default", rows(db, "SELECT * FROM rqt_range(NULL, 5, 'tile', '{\"frame\":\"crs\"}')"),
+          rows(db, "SELECT * FROM rqt_range(NULL, 5, 'tile')"))
+    # the whole Earth: one closed surface
+    x, y, dx, dy = one(db, "SELECT x0, y0, dx, dy FROM rqt_terrains WHERE name = 'globe'")
+    globe = [[None] * 361 for _ in range(181)]
+    for c, r, z in rows(db, "SELECT col, row, z FROM rqt_range(NULL, 0, 'globe')"):
+        globe[r][c] = z
+    for eps in (150, 1500):
+        worst, longest, lone, triangles, vertices, seen, polar, edges = prove_in_space(
+            db, eps, "globe", globe, lambda c, r: (x + c * dx, y + r * dy))
+        check("F29 the Earth: every sample within %d m in space" % eps, worst <= eps and len(seen) > 20000, (worst, longest, len(seen)))
+        equal("F28 the Earth at %d: closed at seam and poles, every edge between two triangles" % eps, lone, 0)
+        equal("F28 the Earth at %d: one sphere (Euler)" % eps, vertices - edges // 2 + triangles, 2)
+        equal("F28 the Earth at %d: a pole is one vertex" % eps,
+              rows(db, "SELECT count(*), min(z), max(z) FROM rqt_range(NULL, ?, 'globe', '{\"frame\":\"ecef\"}') WHERE abs(x) < 1e-3 "
+                   "AND abs(y) < 1e-3", eps)[0][0], 2)
+        slivers = sum(len(set(t)) < 3 for t in polar)
+        check("F28 the Earth at %d: no slivers at the poles" % eps, slivers == 0 and polar, slivers)
+    near_seam = "rqt_bbox(170, -10, -170, 10, 4326)"
+    whole = set(rows(db, "SELECT x0,y0,z0,x1,y1,z1,x2,y2,z2 FROM rqt_triangles(NULL, 400, 'globe', '{\"frame\":\"ecef\"}')"))
+    east = set(rows(db, "SELECT x0,y0,z0,x1,y1,z1,x2,y2,z2 FROM rqt_triangles(rqt_bbox(170, -10, 180, 10), 400, 'globe', '{\"frame\":\"ecef\"}')"))
+    both = set(rows(db, "SELECT x0,y0,z0,x1,y1,z1,x2,y2,z2 FROM rqt_triangles(%s, 400, 'globe', '{\"frame\":\"ecef\"}')" % near_seam))
+    check("F28 regions at the seam are parts of the closed mesh", east < both < whole and east)
+    raises("F28 copies of the seam that differ by more than eps are refused", "differ by up to 1.0 metres; eps must be at least that",
+           lambda: one(db, "SELECT count(*) FROM rqt_range(NULL, 0.5, 'globe', '{\"frame\":\"ecef\"}')"))
+    db.close()
+
+
 def main():
     areas_in_the_plane()
     areas_on_the_ellipsoid()
+    frames()
     profiles_in_the_plane()
     path = temp("earth.gpkg")
     import_terrain(path, os.path.join(os.path.dirname(DATA), "..", "examples", "N44W072.hgt.zip"), name="land")
