@@ -34,7 +34,8 @@ static int add_place(request *r, const void *bytes, size_t n, bool text, double 
     rqt_geometry *geometry = NULL;
     if (!(eps >= 0)) return fail(error, "%s: eps must be 0 or more; it is %!.15g", what, eps);
     int code = grow(p);
-    if (code == SQLITE_OK) code = request_geometry(r, bytes, n, text, what, &geometry, error);
+    if (code == SQLITE_OK)
+        code = request_geometry_bytes(r->connection, r->terrain, bytes, n, text, what, &geometry, error);
     if (code == SQLITE_OK) code = request_region(r, geometry, what, &p->regions[p->count], error);
     rqt_geometry_free(geometry);
     if (code != SQLITE_OK) return code;
@@ -241,7 +242,7 @@ static int read_detail(request *r, char **error) {
 }
 
 int rule_read(request *r, char **error) {
-    if (!r->detail && !r->border) return SQLITE_OK;
+    if (!r->detail && r->mode != REQUEST_BORDER) return SQLITE_OK;
     const char *option = r->detail ? "option \"detail\"" : "mode \"border\"";
     if (r->options.metric != RQT_METRIC_EXACT && r->options.metric != RQT_METRIC_WEDGIE)
         return fail(error,
@@ -254,7 +255,7 @@ int rule_read(request *r, char **error) {
         rqt_rule_create(&r->terrain->lattice, r->terrain->quantum_error, store_allocator(), &r->options.rule);
     if (status == RQT_OK && r->places)
         status = rqt_rule_set_places(r->options.rule, r->places->items, r->places->count);
-    if (status == RQT_OK && r->border) {
+    if (status == RQT_OK && r->mode == REQUEST_BORDER) {
         rqt_region_grow_rectangle(r->region);
         status = rqt_rule_force_border(r->options.rule, r->region);
     }

@@ -62,6 +62,9 @@ void connection_release(void *c);
 void connection_owner(connection *c, bool owned);
 
 /* -------------------------------------------------------------------------------- requests for a patch */
+/* What happens at the region's border, as DESIGN has it. */
+typedef enum request_mode { REQUEST_COVER, REQUEST_SNAP, REQUEST_BORDER, REQUEST_CUT } request_mode;
+
 /* region, eps, terrain, options, as every mesh function takes them. request.c */
 typedef enum frame_kind { FRAME_CRS, FRAME_ECEF, FRAME_ENU } frame_kind; /* in the order of options.c */
 typedef struct space_frame space_frame;
@@ -70,10 +73,10 @@ typedef struct request {
     store *store;
     const store_terrain *terrain;
     rqt_geometry *geometry;
-    rqt_region *region;
+    rqt_region *region; /* mode snap: grown to its squares */
+    request_mode mode;
     double eps;
     store_query_options options;
-    bool border;           /* mode border */
     bool whole;            /* the options name a mode of whole triangles */
     struct cJSON *detail;  /* the option, as it came; NULL: none */
     struct places *places; /* what it says; detail.c */
@@ -88,13 +91,14 @@ int request_read(connection *c, sqlite3_value *region, sqlite3_value *eps, sqlit
                  sqlite3_value *options, request *out, char **error);
 /* A patch with what the product needs; of strips, the one that the options want. Give it back with store_keep. */
 int request_patch(request *r, rqt_product product, rqt_patch *patch, store_reads *reads, char **error);
+/* Mode cut: that patch clipped to the region, instead. Release with rqt_cut_free. cut.c */
+int request_cut(request *r, rqt_cut *cut, char **error);
+/* SQLITE_OK in any other mode; else a sentence that what is asked for cannot hold the answer. cut.c */
+int request_refuse_cut(const request *r, const char *what, char **error);
 /* The patch in wire format, with normals or without. delta.c */
 int wire_mesh(request *r, bool normals, uint8_t **bytes, size_t *size, char **error);
 void request_free(request *r);
-/* A geometry, n bytes of text or BLOB, in the coordinates of the terrain; `what` it is, for sentences. */
-int request_geometry(const request *r, const void *bytes, size_t n, bool text, const char *what,
-                     rqt_geometry **geometry, char **error);
-/* The same as a region. */
+/* A geometry of the request as a region; `what` it is, for sentences. */
 int request_region(const request *r, const rqt_geometry *geometry, const char *what, rqt_region **region,
                    char **error);
 /* The rule of what the options detail and mode want, when terrain and region are known. detail.c */
@@ -115,6 +119,13 @@ int frame_places(const space_frame *f, const rqt_patch *patch, double **xyz, cha
 const char *frame_title(const space_frame *f);
 /* The terrain that a value names; NULL value: the only one. */
 int request_terrain(store *s, sqlite3_value *name, const store_terrain **terrain, char **error);
+/* A geometry (NULL value: none) in the terrain's coordinates, transformed if need be; `what` names it in sentences.
+ * Release with rqt_geometry_free. geometry.c */
+int request_geometry(connection *c, const store_terrain *t, sqlite3_value *value, const char *what,
+                     rqt_geometry **geometry, char **error);
+/* The same of n bytes of text or of a BLOB. */
+int request_geometry_bytes(connection *c, const store_terrain *t, const void *bytes, size_t n, bool text,
+                           const char *what, rqt_geometry **geometry, char **error);
 /* "what must be a number ...": false and a sentence when the value is none, or NaN. */
 bool request_number(sqlite3_value *value, const char *what, double *number, char **error);
 /* The lines of a geometry (points are lines of one point), for functions that want a line: line i has counts[i]

@@ -39,38 +39,24 @@ int request_turn(rqt_geometry *geometry, const store_terrain *t) {
     return status == RQT_OK ? SQLITE_OK : SQLITE_NOMEM;
 }
 
-int request_geometry(const request *r, const void *bytes, size_t n, bool text, const char *what,
-                     rqt_geometry **geometry, char **error) {
-    rqt_message why = {""};
-    const rqt_status status = rqt_geometry_parse(bytes ? bytes : "", n, text, store_allocator(), geometry, &why);
-    if (status == RQT_NO_MEMORY) return SQLITE_NOMEM;
-    if (status != RQT_OK) return fail(error, "%s: %s", what, why.text);
-    const int code = request_place(rqt_geometry_srid(*geometry), what, r->terrain, error);
-    return code == SQLITE_OK ? request_turn(*geometry, r->terrain) : code;
-}
-
 int request_region(const request *r, const rqt_geometry *geometry, const char *what, rqt_region **region,
                    char **error) {
-    const rqt_status status =
-        rqt_region_create(geometry, &r->terrain->placement, &r->terrain->lattice, store_allocator(), region);
+    const store_terrain *t = r->terrain;
+    const rqt_status status = rqt_region_create(geometry, &t->placement, &t->lattice, store_allocator(), region);
     if (status == RQT_OK) return SQLITE_OK;
-    return status == RQT_NO_MEMORY ? SQLITE_NOMEM
-                                   : fail(error, "%s cannot be placed on terrain %s", what, r->terrain->name);
+    return status == RQT_NO_MEMORY ? SQLITE_NOMEM : fail(error, "%s cannot be placed on terrain %s", what, t->name);
 }
 
 static int read_region(request *r, sqlite3_value *value, char **error) {
-    const int type = value ? sqlite3_value_type(value) : SQLITE_NULL;
-    int code = SQLITE_OK;
-    if (type == SQLITE_INTEGER || type == SQLITE_FLOAT)
-        return fail(error, "region must be WKT text, a geometry or NULL; it is a number");
-    if (type != SQLITE_NULL) {
-        const void *bytes =
-            type == SQLITE_TEXT ? (const void *)sqlite3_value_text(value) : sqlite3_value_blob(value);
-        const size_t n = (size_t)sqlite3_value_bytes(value);
-        if (!bytes && n > 0) return SQLITE_NOMEM;
-        code = request_geometry(r, bytes, n, type == SQLITE_TEXT, "region", &r->geometry, error);
-    }
-    return code == SQLITE_OK ? request_region(r, r->geometry, "region", &r->region, error) : code;
+    const store_terrain *t = r->terrain;
+    int code = request_geometry(r->connection, t, value, "region", &r->geometry, error);
+    if (code != SQLITE_OK) return code;
+    code = request_region(r, r->geometry, "region", &r->region, error);
+    if (code != SQLITE_OK || r->mode != REQUEST_SNAP) return code;
+    rqt_region *drawn = r->region;
+    const rqt_status status = rqt_region_snap(drawn, &t->lattice, store_allocator(), &r->region);
+    rqt_region_free(drawn);
+    return status == RQT_OK ? SQLITE_OK : SQLITE_NOMEM;
 }
 
 int request_read(connection *c, sqlite3_value *region, sqlite3_value *eps, sqlite3_value *terrain,
@@ -85,6 +71,12 @@ int request_read(connection *c, sqlite3_value *region, sqlite3_value *eps, sqlit
         const char *json = (const char *)sqlite3_value_text(options);
         code = json ? options_read(json, r, error) : SQLITE_NOMEM;
     }
+    const bool framed = r->frame_kind != FRAME_CRS;
+    if (code == SQLITE_OK && r->mode == REQUEST_CUT && (r->max_vertices > 0 || r->fans || framed))
+        code = fail(error, "option \"%s\" does not go with mode \"cut\"",
+                    r->fans  ? "strip\":\"fan"
+                    : framed ? "frame"
+                             : "max_vertices");
     if (code == SQLITE_OK) code = connection_store(c, &r->store, error);
     if (code == SQLITE_OK) r->connection = c;
     if (code == SQLITE_OK) code = request_terrain(r->store, terrain, &r->terrain, error);

@@ -73,6 +73,12 @@ static int own_format(const request *r, const rqt_patch *patch, rqt_mesh_kind ki
     return code;
 }
 
+static int format_failed(rqt_status status, char **error) {
+    if (status == RQT_OK) return SQLITE_OK;
+    if (status == RQT_NO_MEMORY) return SQLITE_NOMEM;
+    return fail(error, "the mesh is larger than 2 GiB in this format; ask for less or a larger eps");
+}
+
 static void framed_coordinates(const void *context, size_t vertex, double xyz[3]) {
     memcpy(xyz, (const double *)context + 3 * vertex, 3 * sizeof *xyz);
 }
@@ -105,15 +111,46 @@ static int other_format(const request *r, rqt_patch *patch, format_kind kind, co
                                 .eps = r->achieved_eps,
                                 .normals = normals};
     rqt_status status = RQT_OK;
-    if (!r->frame) {
+    int code = SQLITE_OK;
+    if (!r->frame)
         status = format_patch(patch, &frame, kind, store_allocator(), bytes, size);
-    } else {
-        const int code = framed_format(r, patch, kind, bytes, size, &status, error);
-        if (code != SQLITE_OK) return code;
-    }
-    if (status == RQT_OK) return SQLITE_OK;
-    if (status == RQT_NO_MEMORY) return SQLITE_NOMEM;
-    return fail(error, "the mesh is larger than 2 GiB in this format; ask for less or a larger eps");
+    else
+        code = framed_format(r, patch, kind, bytes, size, &status, error);
+    return code == SQLITE_OK ? format_failed(status, error) : code;
+}
+
+typedef struct cut_source {
+    const rqt_cut *cut;
+    const store_terrain *terrain;
+} cut_source;
+
+/* The one expression of the contract, between samples. */
+static void cut_coordinates(const void *context, size_t vertex, double xyz[3]) {
+    const cut_source *s = context;
+    const rqt_cut_vertex *v = &s->cut->vertices[vertex];
+    const rqt_placement *at = &s->terrain->placement;
+    const rqt_unit *unit = &s->terrain->unit;
+    xyz[0] = at->x0 + v->col * at->dx;
+    xyz[1] = at->y0 + v->row * at->dy;
+    xyz[2] = ((double)unit->z0 + v->q / (double)unit->d) * rqt_unit_factor(unit) + unit->offset;
+}
+
+static int cut_format(request *r, format_kind kind, uint8_t **bytes, size_t *size, char **error) {
+    rqt_cut cut;
+    int code = request_cut(r, &cut, error);
+    if (code != SQLITE_OK) return code;
+    const cut_source source = {&cut, r->terrain};
+    const format_mesh mesh = {.vertex_count = cut.vertex_count,
+                              .triangle_count = cut.triangle_count,
+                              .triangles = cut.triangles,
+                              .coordinates = cut_coordinates,
+                              .context = &source,
+                              .srid = r->terrain->srid,
+                              .title = r->terrain->name,
+                              .eps = r->achieved_eps};
+    code = format_failed(format_write(&mesh, kind, store_allocator(), bytes, size), error);
+    rqt_cut_free(&cut);
+    return code;
 }
 
 /* What argument `format` asks for. */
@@ -178,9 +215,17 @@ void call_mesh(sqlite3_context *result, int count, sqlite3_value **arguments) {
             fail(&error, "format \"%s\" holds samples, not points in space: option \"frame\" must be crs", f.name);
     if (code == SQLITE_OK && r.frame && f.normals)
         code = fail(&error, "normals are those of the terrain's CRS: option \"frame\" must be crs");
-    if (code == SQLITE_OK)
-        code = f.family == MESH_WIRE ? wire_mesh(&r, f.normals, &bytes, &size, &error)
-                                     : patch_mesh(&r, &f, &bytes, &size, &error);
+    if (code == SQLITE_OK && (f.family != MESH_OTHER || f.normals)) {
+        char what[60];
+        sqlite3_snprintf(sizeof what, what, "format \"%s%s\"", f.name, f.normals ? "+normals" : "");
+        code = request_refuse_cut(&r, what, &error);
+    }
+    if (code == SQLITE_OK && f.family == MESH_WIRE)
+        code = wire_mesh(&r, f.normals, &bytes, &size, &error);
+    else if (code == SQLITE_OK && r.mode == REQUEST_CUT)
+        code = cut_format(&r, f.kind, &bytes, &size, &error);
+    else if (code == SQLITE_OK)
+        code = patch_mesh(&r, &f, &bytes, &size, &error);
     request_free(&r);
     if (code != SQLITE_OK)
         scalar_error(result, "rqt_mesh", code, error);

@@ -191,6 +191,12 @@ prints "verify: a box, given in any order" "holds" verify t.gpkg --terrain hill 
 cp out box; rqt verify t.gpkg --terrain hill --eps 2 --region 'POLYGON((1200 2200,1400 2200,1400 2400,1200 2400,1200 2200))'
 cmp -s out box; ok "... is the same as its WKT" $?
 prints "verify: a region outside is empty" "empty" verify t.gpkg --terrain hill --eps 2 --region 0,0,1,1
+prints "verify: mode cut" "holds" verify t.gpkg --terrain hill --eps 0,2 --region 'POLYGON((1201.5 2200,1400 2210.25,1333 2400,1201.5 2200))' --mode cut
+prints "verify: mode border" "holds" verify t.gpkg --terrain hill --eps 0,2,1000 --region 'POLYGON((1201.5 2200,1400 2210.25,1333 2400,1201.5 2200))' --mode border
+prints "verify: mode snap" "holds" verify t.gpkg --terrain hill --eps 2 --region 1201,2203,1400,2400 --mode snap
+prints "verify: outline tol" "holds" verify t.gpkg --terrain my.hole-2 --eps 0,3,1000 --outline tol
+refuses "verify: an unknown mode" 2 "there is no such mode; there are" verify t.gpkg --eps 1 --mode x
+refuses "verify: an unknown outline" 2 "there is no such outline" verify t.gpkg --eps 1 --outline x
 prints "verify: rounded heights" "holds" verify u.gpkg --terrain feet --eps 0,1
 
 # ------------------------------------------------------------------------------------------------------------ mesh
@@ -200,7 +206,7 @@ refuses "mesh: no output" 2 "-o is missing" $M --eps 1
 refuses "mesh: .glb is for later" 2 ".glb is not in this version" $M --eps 1 -o a.glb
 refuses "mesh: an unknown ending" 2 "the file ends in" $M --eps 1 -o a.xyz
 refuses "mesh: no ending" 2 "the file ends in" $M --eps 1 -o .obj
-refuses "mesh: --mode cut is for later" 2 "--mode cut is not in this version" $M --eps 1 --mode cut -o a.obj
+refuses "mesh: an unknown outline" 2 "there is no such outline; there are exact and tol" $M --eps 1 --outline x -o a.obj
 refuses "mesh: an unknown mode" 2 "there is no such mode" $M --eps 1 --mode x -o a.obj
 refuses "mesh: a list of eps for a model" 2 "--eps takes one number" $M --eps 1,2 -o a.obj
 refuses "mesh: normals in a file that holds none" 2 "a.obj holds no normals; a .ply does" $M --eps 1 --normals -o a.obj

@@ -5,6 +5,7 @@
  * the strip, of what is in the leaf and in some member by the even-odd rule. Long doubles hold that to 1e-15. What
  * must be so exactly (triangles have an area and turn one way, no two overlap, no vertex lies inside an edge,
  * places are one vertex each) is looked at one by one, pair by pair, in integers. */
+#include "cut.h"
 #include "test_core_database.h"
 
 #define MOST_MEMBERS 3
@@ -407,9 +408,102 @@ static void F26_polygons_of_all_kinds_are_cut_to_their_area(void **state) {
     }
 }
 
+/* Rounding at its worst: leaves of a few units, so that every crossing moves far, and hundreds of segments.
+ * Whatever becomes of the segments, the faces tile the leaf. */
+static void faces_tile_the_leaf_whatever_rounding_does(void **state) {
+    (void)state;
+    random_begin(__func__);
+    for (int n = 0; n < 400; n++) {
+        const int side = 3 << random_between(0, 7);
+        region_point corner[3];
+        do
+            for (int i = 0; i < 3; i++)
+                corner[i] = (region_point){random_between(0, side), random_between(0, n % 2 ? side : 2)};
+        while (region_side(corner[0], corner[1], corner[2]) <= 0);
+        cut_faces f = {.allocator = test_allocator};
+        assert_true(cut_faces_begin(&f, corner));
+        const int segments = random_between(1, n % 8 ? 12 : 120);
+        for (int s = 0; s < segments; s++) {
+            uint32_t end[2];
+            for (int e = 0; e < 2; e++) {
+                region_point p;
+                bool inside;
+                do {
+                    p = (region_point){random_between(0, side), random_between(0, side)};
+                    if (random_between(0, 3) == 0) p = f.points[random_bits() % f.point_count];
+                    inside = true;
+                    for (int i = 0; i < 3; i++)
+                        inside = inside && region_side(corner[i], corner[(i + 1) % 3], p) >= 0;
+                } while (!inside);
+                assert_true(cut_faces_add(&f, p, &end[e]));
+                CHECK(f.points[end[e]].x == p.x && f.points[end[e]].y == p.y, "point %u is elsewhere", end[e]);
+            }
+            assert_true(cut_faces_fix(&f, end[0], end[1]));
+        }
+        __int128 sum = 0;
+        for (size_t t = 0; t < f.face_count; t++) {
+            const cut_face *face = &f.faces[t];
+            const __int128 twice =
+                region_side(f.points[face->corner[0]], f.points[face->corner[1]], f.points[face->corner[2]]);
+            CHECK(twice > 0, "face %zu has no area", t);
+            sum += twice;
+            for (int i = 0; i < 3; i++) {
+                const uint32_t from = face->corner[i], to = face->corner[(i + 1) % 3];
+                if (face->next[i] != CUT_NO_FACE) { /* both say so of the same edge */
+                    const cut_face *o = &f.faces[face->next[i]];
+                    bool back = false;
+                    for (int k = 0; k < 3; k++)
+                        back |= o->next[k] == t && o->corner[k] == to && o->corner[(k + 1) % 3] == from &&
+                                o->fixed[k] == face->fixed[i];
+                    CHECK(back, "faces %zu and %u are neighbours one way", t, face->next[i]);
+                    continue;
+                }
+                bool on_side = false; /* nothing beyond: it lies on a side of the leaf */
+                for (int k = 0; k < 3; k++)
+                    on_side |= region_side(corner[k], corner[(k + 1) % 3], f.points[from]) == 0 &&
+                               region_side(corner[k], corner[(k + 1) % 3], f.points[to]) == 0;
+                CHECK(on_side, "face %zu has no neighbour inside the leaf", t);
+            }
+        }
+        CHECK(sum == region_side(corner[0], corner[1], corner[2]), "the faces do not tile the leaf");
+        cut_faces_free(&f);
+    }
+}
+
+/* Shares are rounded once. */
+static void shares_are_the_nearest(void **state) {
+    (void)state;
+    random_begin(__func__);
+    mpz_t n, part, whole, q;
+    mpz_inits(n, part, whole, q, NULL);
+    for (int i = 0; i < 20000; i++) {
+        const uint64_t way = random_bits() >> random_between(0, 63);
+        __int128 w = ((__int128)(random_bits() >> 2) << 64 | (__int128)random_bits()) >> random_between(0, 120);
+        if (w == 0) w = 1;
+        const __int128 p =
+            i % 5 == 0 ? w / (i % 3 + 1) : (__int128)((unsigned __int128)(random_bits() >> 2) << 64) % (w + 1);
+        mpz_set_ui(n, way);
+        mpz_set_ui(part, (unsigned long)(p >> 64));
+        mpz_mul_2exp(part, part, 64);
+        mpz_add_ui(part, part, (unsigned long)p);
+        mpz_set_ui(whole, (unsigned long)(w >> 64));
+        mpz_mul_2exp(whole, whole, 64);
+        mpz_add_ui(whole, whole, (unsigned long)w);
+        mpz_mul(q, n, part);
+        mpz_mul_2exp(q, q, 1);
+        mpz_add(q, q, whole);
+        mpz_mul_2exp(whole, whole, 1);
+        mpz_fdiv_q(q, q, whole);
+        assert_true(cut_share(way, p, w) == mpz_get_ui(q));
+    }
+    mpz_clears(n, part, whole, q, NULL);
+}
+
 int main(void) {
     random_announce();
     const struct CMUnitTest tests[] = {
+        TEST(shares_are_the_nearest),
+        TEST(faces_tile_the_leaf_whatever_rounding_does),
         TEST(F26_polygons_of_all_kinds_are_cut_to_their_area),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

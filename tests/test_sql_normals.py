@@ -120,6 +120,8 @@ for name, source, eps in (("africa", "eastafrica.tif", 400), ("the globe", "etop
         return (0 if abs(abs(y0 + row * dy) - 90) < 1e-9 else dx * lon), dy * lat
     compare(name, db, z, metres_in, None, eps)
     for form, why in (("ply", "normals are those of the terrain's CRS"), ("rqt", 'format "rqt" holds samples')):
+        raises("%s: no normals between samples (%s)" % (name, form), 'rqt_mesh(): format "%s+normals" holds whole samples' % form, lambda: one(
+            db, "SELECT rqt_mesh('POLYGON((31 1, 32 1, 32 2, 31 1))', 100, ?, NULL, '{\"mode\": \"cut\"}')", form + "+normals"))
         raises("%s: no normals in another frame (%s)" % (name, form), "rqt_mesh(): " + why, lambda: one(
             db, "SELECT rqt_mesh('POINT(32 1)', 100, ?, NULL, '{\"frame\": \"enu\"}')", form + "+normals"))
     if name == "the globe":

@@ -148,6 +148,11 @@ for kind, path in databases.items():
 africa = s.temp("africa.gpkg")
 s.import_terrain(africa, AFRICA, name="africa")
 db = s.connect(africa)
+CUT = "POLYGON((31.01 1.02, 32.34 1.11, 32.2 2.07, 31.01 1.02))", 100, None, '{"mode": "cut"}'
+expected = [("POLYGON Z", t) for t in s.triangles(db, *CUT)]
+equal("mode cut: gpkg is the clipped triangle", [geometry(blob, 40)[0] for blob, in rows(db, "SELECT gpkg FROM rqt_triangles(?, ?, ?, ?)", *CUT)], expected)
+equal("mode cut: gpkg is the vertex between samples", [geometry(blob, 8)[0][1] for blob, in rows(db, "SELECT gpkg FROM rqt_range(?, ?, ?, ?)", *CUT)],
+      rows(db, "SELECT x, y, z FROM rqt_range(?, ?, ?, ?)", *CUT))
 for frame, srid in (("ecef", 4978), ("enu", 0)):
     options = '{"frame": "%s"}' % frame
     expected = s.triangles(db, "POINT(30.01 0.02)", 100, None, options)

@@ -25,9 +25,13 @@ static const char HELP[] =
     "  --region R      x0,y0,x1,y1 or WKT, in the terrain's coordinates (default: all)\n"
     "  --terrain T     which terrain (default: the only one)\n"
     "  --normals       with the terrain's normal at each vertex, from its full-resolution samples; for .ply\n"
-    "  --mode M        what happens at the region's border: cover, the default: every triangle that has a part\n"
-    "                  of its inside in the region, whole; border: smaller triangles along it, so that the mesh\n"
-    "                  ends there, at half cells of the samples (a rectangle grows outward to whole samples)\n"
+    "  --mode M        what happens at the region's border: cover, the default: every triangle that has a part of\n"
+    "                  its inside in the region, whole; snap: the same of the region grown to squares of a power "
+    "of\n"
+    "                  two of samples; border: triangles are split along it, down to half cells of the samples; "
+    "cut:\n"
+    "                  triangles are clipped to the region\n"
+    "  --outline O     of voids: exact, the default, or tol: moved by no more than eps * --void-tol of the import\n"
     "  -o, --output F  the file; it is replaced when it exists, and only by a whole one\n"
     "  --width W       width of a picture in pixels, 1200 to 12000 (default 1800)\n"
     "  --help          this text\n"
@@ -39,20 +43,18 @@ static const char HELP[] =
 
 enum { DEFAULT_WIDTH = 1800, LEAST_WIDTH = 1200, LARGEST_WIDTH = 12000 };
 
-static const struct option OPTIONS[] = {{"eps", required_argument, NULL, 'e'},
-                                        {"region", required_argument, NULL, 'r'},
-                                        {"terrain", required_argument, NULL, 't'},
-                                        {"mode", required_argument, NULL, 'm'},
-                                        {"output", required_argument, NULL, 'o'},
-                                        {"width", required_argument, NULL, 'w'},
-                                        {"normals", no_argument, NULL, 'n'},
-                                        {"help", no_argument, NULL, 'h'},
-                                        {NULL, 0, NULL, 0}};
+static const struct option OPTIONS[] = {
+    {"eps", required_argument, NULL, 'e'},     {"region", required_argument, NULL, 'r'},
+    {"terrain", required_argument, NULL, 't'}, {"mode", required_argument, NULL, 'm'},
+    {"output", required_argument, NULL, 'o'},  {"width", required_argument, NULL, 'w'},
+    {"normals", no_argument, NULL, 'n'},       {"outline", required_argument, NULL, 'O'},
+    {"help", no_argument, NULL, 'h'},          {NULL, 0, NULL, 0}};
 
 typedef enum kind { NO_KIND, OBJ, PLY, GPKG, SVG, PNG } kind;
 
 typedef struct request {
     const char *database, *terrain, *region, *output;
+    cli_answer_options answer;
     const char *options; /* of the SQL functions, JSON */
     double eps[CLI_MAX_EPS];
     int count, width;
@@ -75,19 +77,6 @@ static kind kind_of(const char *path) {
     else
         cli_usage("%s: the file ends in .obj, .ply, .gpkg, .svg or .png", path);
     return NO_KIND;
-}
-
-static int set_mode(const char *mode, request *r) {
-    static const struct {
-        const char *mode, *options;
-    } modes[] = {{"cover", "{\"mode\":\"cover\"}"}, {"border", "{\"mode\":\"border\"}"}};
-    for (size_t i = 0; i < sizeof modes / sizeof *modes; i++)
-        if (!strcmp(mode, modes[i].mode)) {
-            r->options = modes[i].options;
-            return CLI_OK;
-        }
-    if (!strcmp(mode, "snap") || !strcmp(mode, "cut")) return cli_usage("--mode %s is not in this version", mode);
-    return cli_usage("--mode %s: there is no such mode; this version has cover and border", mode);
 }
 
 /* The bytes of SQL's rqt_mesh. */
@@ -139,7 +128,9 @@ static int set_option(request *r, int option) {
         r->terrain = optarg;
         return CLI_OK;
     case 'm':
-        return set_mode(optarg, r);
+        return cli_set_mode(&r->answer, optarg);
+    case 'O':
+        return cli_set_outline(&r->answer, optarg);
     case 'o':
         r->output = optarg;
         return CLI_OK;
@@ -167,6 +158,7 @@ static int run(int argc, char **argv) {
     if (argc - optind != 1)
         return argc == optind ? cli_usage("a database is missing") : cli_usage("one database at a time");
     r.database = argv[optind];
+    r.options = cli_options_json(&r.answer);
     if (!r.count) return cli_usage("--eps is missing: the tolerance in metres");
     if (!r.output) return cli_usage("-o is missing: the file to write");
     if ((r.kind = kind_of(r.output)) == NO_KIND) return CLI_USAGE;

@@ -60,7 +60,7 @@ static bool collect(const rqt_mesh_header *header, const uint8_t *vertices, cons
 bool picture_mesh_read(sqlite3 *db, const char *region, double eps, const char *terrain, const char *options,
                        picture_mesh *mesh) {
     *mesh = (picture_mesh){.eps = eps};
-    if (!cli_verify(db, region, eps, terrain, &mesh->proof)) return false;
+    if (!cli_verify(db, region, eps, terrain, options, &mesh->proof)) return false;
     sqlite3_stmt *row = cli_prepare(db, "SELECT rqt_mesh(?1, ?2, 'indexed', ?3, ?4)");
     if (!row) return false;
     cli_bind_query(row, region, eps, terrain);

@@ -465,6 +465,11 @@ const double *rqt_geometry_line(const rqt_geometry *geometry, size_t n, size_t *
 /* Adds to every member its copies at each multiple of `period` that, added to its x, puts its box on [low, high]:
  * longitudes are the same modulo 360. A member with coordinates beyond three periods gets none. */
 rqt_status rqt_geometry_repeat(rqt_geometry *geometry, double period, double low, double high);
+bool rqt_geometry_is_empty(const rqt_geometry *geometry);
+/* As well-known binary, x and y only: one member as what it is, several as a collection. *bytes is released with
+ * allocator->resize(context, bytes, 0). */
+rqt_status rqt_geometry_wkb(const rqt_geometry *geometry, const rqt_allocator *allocator, uint8_t **bytes,
+                            size_t *size);
 
 /* Where the samples of a terrain lie: sample (col,row) is at (x0 + col*dx, y0 + row*dy). dx, dy finite, not 0. */
 typedef struct rqt_placement {
@@ -495,6 +500,14 @@ void rqt_region_grow_rectangle(rqt_region *region);
  * member with an area: interior meets interior. For lines and points, and polygons that the rounding collapsed:
  * the closed triangle meets it. Exact. */
 bool rqt_region_meets(const rqt_region *region, rqt_vertex a, rqt_vertex b, rqt_vertex c);
+/* Mode `snap`: the union of all squares of a grid that the region meets, clipped to the raster: a square belongs
+ * when its interior meets the interior of a member with an area, or when a line or point touches it. The grid is
+ * anchored at sample (0,0); its side is the largest power of two of samples that is not above an eighth of the
+ * longer side of the region's box (rqt_region_box), at least 1: so no region has more than 18 squares a side.
+ * Everything stays everything. */
+rqt_status rqt_region_snap(const rqt_region *region, const rqt_lattice *lattice, const rqt_allocator *allocator,
+                           rqt_region **snapped);
+int32_t rqt_region_snap_side(const rqt_region *region);
 /* Is the sample in the interior of a member with an area? */
 bool rqt_region_contains(const rqt_region *region, rqt_vertex sample);
 

@@ -228,9 +228,22 @@ const rqt_lattice *rule_lattice(const rqt_rule *rule) {
     return &rule->lattice;
 }
 
+/* A place that holds the whole cell meets every box in it. */
 rule_range rule_range_below(const rqt_rule *rule, rqt_vertex centre) {
-    return (rule_range){
+    const int rank = rqt_vertex_rank(&rule->lattice, centre);
+    const int32_t half = 1 << rank / 2;
+    const region_box reach = reach_of(centre, rank);
+    rule_range range = {
         .least = rqt_rule_threshold(rule, centre), .most = rule->base[0], .forced = is_forced(rule, centre)};
+    region_search s;
+    region_search_begin(&s, rule->nodes, rule->place_count, &reach);
+    for (size_t i; region_search_next(&s, &i);) {
+        const int32_t code = code_at(rule, &rule->places[i], 0);
+        if (code < range.most && region_area_relation(rule->places[i].region, centre.x - half, centre.y - half,
+                                                      centre.x + half, centre.y + half) == RQT_INSIDE)
+            range.most = code;
+    }
+    return range;
 }
 
 static bool is_answered(const rqt_rule *rule, int32_t x, int32_t y, int32_t side, rqt_code em) {

@@ -4,7 +4,8 @@
 
 #include "internal.h"
 
-/* Of all vertices that descend from a centre: their thresholds lie in least .. most; may one of them be forced? */
+/* Of the vertices in the closed cell of a centre, but for its corners: their thresholds lie in least .. most; may
+ * one of them be forced? */
 typedef struct rule_range {
     int32_t least, most;
     bool forced;

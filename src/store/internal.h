@@ -92,8 +92,6 @@ void store_methods_free(store *s);
 /* A row per answer of a query, as its summary has it. query.c */
 int store_begin_reads(const rqt_query *query, store_reads *reads);
 int64_t store_count_selected(const rqt_query *query, rqt_block_number number, const rqt_block *block);
-/* Was sqlite3_interrupt called? *code says how to end. query.c */
-bool store_is_interrupted(store *s, int *code);
 
 #define STORE_MINIMAL "_minimal" /* suffix of the tables that hold minimal errors */
 /* A writer of those tables, beside a terrain of main that is complete. writer.c */

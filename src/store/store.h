@@ -108,6 +108,8 @@ int store_query(store *s, const store_terrain *t, const rqt_region *region, doub
 int store_query_within(store *s, const store_terrain *t, const rqt_region *region, double eps,
                        const store_query_options *options, int64_t max_vertices, double *achieved, rqt_patch *patch,
                        store_reads *reads, char **error);
+/* Was sqlite3_interrupt called? *code says how to end. */
+bool store_is_interrupted(store *s, int *code);
 /* Instead of rqt_patch_free: the store keeps the memory for its next query, up to a limit. */
 void store_keep(store *s, rqt_patch *patch);
 /* Memory that a metric which is not stored may take, heights included. */
