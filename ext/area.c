@@ -88,19 +88,17 @@ static void area_column(void *data, size_t row, int column, sqlite3_context *res
 
 /* The patch, or what of it lies in the region. */
 static int measure_region(request *r, measurer *m, char **error) {
-    rqt_patch patch;
-    int code = request_patch(r, RQT_PRODUCT_TRIANGLES, &patch, NULL, error);
-    if (code != SQLITE_OK) return code;
-    if (r->whole || rqt_region_is_all(r->region)) {
-        measure_patch(m, &patch);
-    } else {
+    if (r->mode == REQUEST_CUT && !rqt_region_is_all(r->region)) {
         rqt_cut cut;
-        const rqt_status status =
-            rqt_cut_make(&patch, r->region, &r->terrain->lattice, store_allocator(), NULL, NULL, &cut);
-        code = status == RQT_OK ? SQLITE_OK : status == RQT_NO_MEMORY ? SQLITE_NOMEM : fail(error, "cannot cut");
-        if (code == SQLITE_OK) measure_cut(m, &cut);
+        const int code = request_cut(r, &cut, error);
+        if (code != SQLITE_OK) return code;
+        measure_cut(m, &cut);
         rqt_cut_free(&cut);
+        return SQLITE_OK;
     }
+    rqt_patch patch;
+    const int code = request_patch(r, RQT_PRODUCT_TRIANGLES, &patch, NULL, error);
+    if (code == SQLITE_OK) measure_patch(m, &patch);
     store_keep(r->store, &patch);
     return code;
 }
@@ -109,6 +107,7 @@ int fill_area(connection *c, sqlite3_value **arguments, row_set *rows, char **er
     request r;
     int code = request_read(c, arguments[0], arguments[1], arguments[2], arguments[3], &r, error);
     if (code != SQLITE_OK) return code;
+    if (!r.mode_given) r.mode = REQUEST_CUT;
     measurer m = {.terrain = r.terrain, .ellipsoid = GEO_WGS84, .metre = terrain_metre(r.terrain)};
     if (r.terrain->lonlat && !r.terrain->wgs84 && !geo_ellipsoid_of_wkt(r.terrain->crs, &m.ellipsoid))
         code = fail(error, "the CRS of terrain %s names no ellipsoid", r.terrain->name);

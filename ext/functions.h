@@ -75,9 +75,9 @@ typedef struct request {
     rqt_geometry *geometry;
     rqt_region *region; /* mode snap: grown to its squares */
     request_mode mode;
+    bool mode_given; /* the options name one */
     double eps;
     store_query_options options;
-    bool whole;            /* the options name a mode of whole triangles */
     struct cJSON *detail;  /* the option, as it came; NULL: none */
     struct places *places; /* what it says; detail.c */
     frame_kind frame_kind; /* where the mesh is drawn */
@@ -98,9 +98,9 @@ int request_refuse_cut(const request *r, const char *what, char **error);
 /* The patch in wire format, with normals or without. delta.c */
 int wire_mesh(request *r, bool normals, uint8_t **bytes, size_t *size, char **error);
 void request_free(request *r);
-/* A geometry of the request as a region; `what` it is, for sentences. */
-int request_region(const request *r, const rqt_geometry *geometry, const char *what, rqt_region **region,
-                   char **error);
+/* A geometry of the request as a region; `what` it is, for sentences. On a terrain in degrees it is one on every
+ * turn that meets the terrain, for longitudes are the same modulo 360: the geometry gets more members. */
+int request_region(const request *r, rqt_geometry *geometry, const char *what, rqt_region **region, char **error);
 /* The rule of what the options detail and mode want, when terrain and region are known. detail.c */
 int rule_read(request *r, char **error);
 void rule_free(request *r);
@@ -136,14 +136,11 @@ typedef struct line_set {
     size_t count, points;
     int32_t srid;
 } line_set;
-int lines_read(sqlite3_value *value, line_set *lines, char **error); /* lines.c */
+/* t: the terrain whose coordinates they are to have; NULL: as they come. lines.c */
+int lines_read(connection *c, const store_terrain *t, sqlite3_value *value, line_set *lines, char **error);
 void lines_free(line_set *lines);
-/* Is it in the terrain's CRS? */
-int request_place(int32_t srid, const char *what, const store_terrain *t, char **error);
 /* Metres in a unit of a terrain's x and y, where they are no angles; 1 when its CRS does not say. */
 double terrain_metre(const store_terrain *t);
-/* Longitudes are the same modulo 360: add the copies that meet the terrain, if it is in degrees. */
-int request_turn(rqt_geometry *geometry, const store_terrain *t);
 /* Options of the contract; sentences name what is unknown and what is not in this version. options.c */
 int options_read(const char *json, request *r, char **error);
 

@@ -106,9 +106,9 @@ int request_geometry_bytes(connection *c, const store_terrain *t, const void *by
     int code = parse(bytes, n, text, what, geometry, error);
     if (code != SQLITE_OK) return code;
     const int32_t srid = rqt_geometry_srid(*geometry);
-    if (srid != 0 && srid != t->srid && !(srid == 4326 && t->wgs84) && !rqt_geometry_is_empty(*geometry))
-        code = transform(connection_db(c), t, what, geometry, error);
-    if (code == SQLITE_OK) code = request_turn(*geometry, t);
+    if (srid == 0 || srid == t->srid || (srid == 4326 && t->wgs84) || rqt_geometry_is_empty(*geometry))
+        return SQLITE_OK;
+    code = transform(connection_db(c), t, what, geometry, error);
     if (code != SQLITE_OK) {
         rqt_geometry_free(*geometry);
         *geometry = NULL;

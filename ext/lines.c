@@ -24,22 +24,26 @@ static int take_lines(const rqt_geometry *geometry, line_set *lines, char **erro
     return SQLITE_OK;
 }
 
-int lines_read(sqlite3_value *value, line_set *lines, char **error) {
+static int parse(sqlite3_value *value, rqt_geometry **geometry, char **error) {
+    const bool text = sqlite3_value_type(value) == SQLITE_TEXT;
+    const void *bytes = text ? (const void *)sqlite3_value_text(value) : sqlite3_value_blob(value);
+    const size_t n = (size_t)sqlite3_value_bytes(value);
+    if (!bytes && n > 0) return SQLITE_NOMEM;
+    rqt_message why = {""};
+    const rqt_status status = rqt_geometry_parse(bytes ? bytes : "", n, text, store_allocator(), geometry, &why);
+    if (status == RQT_OK) return SQLITE_OK;
+    return status == RQT_NO_MEMORY ? SQLITE_NOMEM : fail(error, "line: %s", why.text);
+}
+
+int lines_read(connection *c, const store_terrain *t, sqlite3_value *value, line_set *lines, char **error) {
     *lines = (line_set){0};
     const int type = value ? sqlite3_value_type(value) : SQLITE_NULL;
     if (type != SQLITE_TEXT && type != SQLITE_BLOB)
         return fail(error, "line must be WKT text or a geometry; it is %s",
                     type == SQLITE_NULL ? "NULL" : "a number");
-    const void *bytes = type == SQLITE_TEXT ? (const void *)sqlite3_value_text(value) : sqlite3_value_blob(value);
-    const size_t n = (size_t)sqlite3_value_bytes(value);
-    if (!bytes && n > 0) return SQLITE_NOMEM;
-    rqt_geometry *geometry;
-    rqt_message why = {""};
-    const rqt_status status =
-        rqt_geometry_parse(bytes ? bytes : "", n, type == SQLITE_TEXT, store_allocator(), &geometry, &why);
-    if (status == RQT_NO_MEMORY) return SQLITE_NOMEM;
-    if (status != RQT_OK) return fail(error, "line: %s", why.text);
-    const int code = take_lines(geometry, lines, error);
+    rqt_geometry *geometry = NULL;
+    int code = t ? request_geometry(c, t, value, "line", &geometry, error) : parse(value, &geometry, error);
+    if (code == SQLITE_OK) code = take_lines(geometry, lines, error);
     rqt_geometry_free(geometry);
     if (code != SQLITE_OK) lines_free(lines);
     return code;

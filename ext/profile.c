@@ -123,13 +123,8 @@ static int walk_path(store *s, const measure *m, double eps, row_set *rows, char
     size_t count = 0;
     rqt_status status = rqt_geometry_of_lines(m->path->lonlat, m->path->line_points, m->path->lines, 0,
                                               store_allocator(), &geometry);
-    int code = status == RQT_OK ? request_turn(geometry, t) : SQLITE_NOMEM;
-    if (code == SQLITE_OK) {
-        status = rqt_region_create(geometry, &t->placement, &t->lattice, store_allocator(), &region);
-        if (status != RQT_OK)
-            code = status == RQT_NO_MEMORY ? SQLITE_NOMEM
-                                           : fail(error, "line cannot be placed on terrain %s", t->name);
-    }
+    const request where = {.terrain = t};
+    int code = status == RQT_OK ? request_region(&where, geometry, "line", &region, error) : SQLITE_NOMEM;
     const store_query_options options = {
         .select = RQT_SELECT_THRESHOLD, .outline = RQT_OUTLINE_EXACT, .product = RQT_PRODUCT_TRIANGLES};
     if (code == SQLITE_OK) code = store_query(s, t, region, eps, &options, &patch, NULL, error);
@@ -154,15 +149,13 @@ int fill_profile(connection *c, sqlite3_value **arguments, row_set *rows, char *
     double eps;
     if (!request_number(arguments[1], "eps", &eps, error)) return *error ? SQLITE_ERROR : SQLITE_NOMEM;
     if (eps < 0) return fail(error, "eps must be 0 or more; it is %!.15g", eps);
-    line_set lines;
-    int code = lines_read(arguments[0], &lines, error);
-    if (code != SQLITE_OK) return code;
+    line_set lines = {0};
     store *s;
-    code = connection_store(c, &s, error);
+    int code = connection_store(c, &s, error);
     if (code == SQLITE_OK) {
         measure m = {.ellipsoid = GEO_WGS84};
         code = request_terrain(s, arguments[2], &m.t, error);
-        if (code == SQLITE_OK) code = request_place(lines.srid, "line", m.t, error);
+        if (code == SQLITE_OK) code = lines_read(c, m.t, arguments[0], &lines, error);
         geo_path path = {0};
         m.path = &path;
         if (code == SQLITE_OK && m.t->lonlat) {

@@ -26,23 +26,13 @@ int request_terrain(store *s, sqlite3_value *name, const store_terrain **terrain
     return store_find(s, text, terrain, error);
 }
 
-int request_place(int32_t srid, const char *what, const store_terrain *t, char **error) {
-    if (srid == 0 || srid == t->srid || (srid == 4326 && t->wgs84)) return SQLITE_OK;
-    return fail(error, "%s has SRID %d, terrain %s has SRID %d; transforming between them is not in this version",
-                what, srid, t->name, t->srid);
-}
-
-int request_turn(rqt_geometry *geometry, const store_terrain *t) {
-    if (!t->lonlat) return SQLITE_OK;
-    const double first = t->placement.x0, last = first + (t->lattice.width - 1) * t->placement.dx;
-    const rqt_status status = rqt_geometry_repeat(geometry, 360, fmin(first, last), fmax(first, last));
-    return status == RQT_OK ? SQLITE_OK : SQLITE_NOMEM;
-}
-
-int request_region(const request *r, const rqt_geometry *geometry, const char *what, rqt_region **region,
-                   char **error) {
+int request_region(const request *r, rqt_geometry *geometry, const char *what, rqt_region **region, char **error) {
     const store_terrain *t = r->terrain;
-    const rqt_status status = rqt_region_create(geometry, &t->placement, &t->lattice, store_allocator(), region);
+    const double first = t->placement.x0, last = first + (t->lattice.width - 1) * t->placement.dx;
+    rqt_status status = RQT_OK;
+    if (geometry && t->lonlat) status = rqt_geometry_repeat(geometry, 360, fmin(first, last), fmax(first, last));
+    if (status == RQT_OK)
+        status = rqt_region_create(geometry, &t->placement, &t->lattice, store_allocator(), region);
     if (status == RQT_OK) return SQLITE_OK;
     return status == RQT_NO_MEMORY ? SQLITE_NOMEM : fail(error, "%s cannot be placed on terrain %s", what, t->name);
 }
@@ -71,12 +61,11 @@ int request_read(connection *c, sqlite3_value *region, sqlite3_value *eps, sqlit
         const char *json = (const char *)sqlite3_value_text(options);
         code = json ? options_read(json, r, error) : SQLITE_NOMEM;
     }
-    const bool framed = r->frame_kind != FRAME_CRS;
-    if (code == SQLITE_OK && r->mode == REQUEST_CUT && (r->max_vertices > 0 || r->fans || framed))
-        code = fail(error, "option \"%s\" does not go with mode \"cut\"",
-                    r->fans  ? "strip\":\"fan"
-                    : framed ? "frame"
-                             : "max_vertices");
+    if (code == SQLITE_OK && r->mode == REQUEST_CUT && (r->max_vertices > 0 || r->fans))
+        code =
+            fail(error, "option \"%s\" does not go with mode \"cut\"", r->fans ? "strip\":\"fan" : "max_vertices");
+    if (code == SQLITE_OK && r->mode == REQUEST_CUT && r->frame_kind != FRAME_CRS)
+        code = fail(error, "option \"frame\" does not go with mode \"cut\"");
     if (code == SQLITE_OK) code = connection_store(c, &r->store, error);
     if (code == SQLITE_OK) r->connection = c;
     if (code == SQLITE_OK) code = request_terrain(r->store, terrain, &r->terrain, error);

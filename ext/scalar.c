@@ -85,7 +85,7 @@ static void framed_coordinates(const void *context, size_t vertex, double xyz[3]
 
 /* In a frame of its own: geocentric has an SRID, east-north-up has none. */
 static int framed_format(const request *r, rqt_patch *patch, format_kind kind, uint8_t **bytes, size_t *size,
-                         rqt_status *status, char **error) {
+                         char **error) {
     double *xyz = NULL;
     int code = frame_merge(r->frame, patch);
     if (code == SQLITE_OK) code = frame_places(r->frame, patch, &xyz, error);
@@ -97,26 +97,21 @@ static int framed_format(const request *r, rqt_patch *patch, format_kind kind, u
                               .srid = request_srid(r),
                               .title = frame_title(r->frame),
                               .eps = r->achieved_eps};
-    if (code == SQLITE_OK) *status = format_write(&mesh, kind, store_allocator(), bytes, size);
+    if (code == SQLITE_OK) code = format_failed(format_write(&mesh, kind, store_allocator(), bytes, size), error);
     sqlite3_free(xyz);
     return code;
 }
 
 static int other_format(const request *r, rqt_patch *patch, format_kind kind, const float *normals, uint8_t **bytes,
                         size_t *size, char **error) {
+    if (r->frame) return framed_format(r, patch, kind, bytes, size, error);
     const format_frame frame = {.placement = r->terrain->placement,
                                 .unit = r->terrain->unit,
                                 .srid = r->terrain->srid,
                                 .title = r->terrain->name,
                                 .eps = r->achieved_eps,
                                 .normals = normals};
-    rqt_status status = RQT_OK;
-    int code = SQLITE_OK;
-    if (!r->frame)
-        status = format_patch(patch, &frame, kind, store_allocator(), bytes, size);
-    else
-        code = framed_format(r, patch, kind, bytes, size, &status, error);
-    return code == SQLITE_OK ? format_failed(status, error) : code;
+    return format_failed(format_patch(patch, &frame, kind, store_allocator(), bytes, size), error);
 }
 
 typedef struct cut_source {

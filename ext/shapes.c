@@ -82,7 +82,7 @@ void call_corridor(sqlite3_context *result, int count, sqlite3_value **arguments
     double metres;
     line_set lines = {0};
     geo_polygons corridor = {0};
-    int code = lines_read(arguments[0], &lines, &error);
+    int code = lines_read(NULL, NULL, arguments[0], &lines, &error);
     if (code == SQLITE_OK && lines.srid != 0 && lines.srid != 4326)
         code = fail(&error, "line must be in SRID 4326; it has SRID %d", lines.srid);
     if (code == SQLITE_OK && !request_number(arguments[1], "metres", &metres, &error))

@@ -105,8 +105,6 @@ SELECT * FROM rqt_triangles(NULL, 1, NULL, '{"max_triangles":100}');
 --! rqt_triangles(): option "max_triangles" is not in this version
 SELECT * FROM rqt_range(NULL, 1, NULL, '{"previous":"x"}');
 --! rqt_range(): option "previous" is not in this version
-SELECT * FROM rqt_strip(NULL, 1, NULL, '{"frame":null}');
---! rqt_strip(): option "frame" is not in this version
 SELECT * FROM rqt_verify(NULL, 1, NULL, '{"test":{}}');
 --! rqt_verify(): option "test" is not in this version
 
