@@ -241,6 +241,17 @@ static int read_detail(request *r, char **error) {
     return fail(error, "option \"detail\" must be a list of [geometry as text, eps], or the name of a table");
 }
 
+/* Why a border was not finished. */
+typedef struct waiting {
+    store *store;
+    int code;
+} waiting;
+
+static bool is_interrupted(void *context) {
+    waiting *w = context;
+    return store_is_interrupted(w->store, &w->code);
+}
+
 int rule_read(request *r, char **error) {
     if (!r->detail && r->mode != REQUEST_BORDER) return SQLITE_OK;
     const char *option = r->detail ? "option \"detail\"" : "mode \"border\"";
@@ -251,15 +262,16 @@ int rule_read(request *r, char **error) {
                     option, rqt_metric_name(r->options.metric));
     int code = r->detail ? read_detail(r, error) : SQLITE_OK;
     if (code != SQLITE_OK) return code;
+    waiting w = {r->store, SQLITE_INTERRUPT};
     rqt_status status =
         rqt_rule_create(&r->terrain->lattice, r->terrain->quantum_error, store_allocator(), &r->options.rule);
     if (status == RQT_OK && r->places)
         status = rqt_rule_set_places(r->options.rule, r->places->items, r->places->count);
     if (status == RQT_OK && r->mode == REQUEST_BORDER) {
         rqt_region_grow_rectangle(r->region);
-        status = rqt_rule_force_border(r->options.rule, r->region);
+        status = rqt_rule_force_border(r->options.rule, r->region, is_interrupted, &w);
     }
-    return status == RQT_OK ? SQLITE_OK : SQLITE_NOMEM;
+    return status == RQT_OK ? SQLITE_OK : status == RQT_INTERRUPTED ? w.code : SQLITE_NOMEM;
 }
 
 void rule_free(request *r) {

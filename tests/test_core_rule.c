@@ -155,7 +155,7 @@ static void core_rule_create(core_rule *c, const trial *t) {
     if (t->has_border) {
         c->border = region_of_shape(&t->border, l);
         rqt_region_grow_rectangle(c->border);
-        assert_int_equal(rqt_rule_force_border(c->rule, c->border), RQT_OK);
+        assert_int_equal(rqt_rule_force_border(c->rule, c->border, NULL, NULL), RQT_OK);
     }
 }
 
@@ -791,6 +791,30 @@ static void a_lowered_eps_is_rounded_down(void **state) {
     rqt_rule_free(rule);
 }
 
+static bool stop_at_once(void *context) {
+    ++*(int *)context;
+    return true;
+}
+
+static void a_long_border_can_be_interrupted(void **state) {
+    (void)state;
+    static const char text[] = "POLYGON((3.5 2, 30000 700, 22000 29000, 3.5 2))";
+    const rqt_lattice lattice = {32769, 32769, 15};
+    rqt_geometry *geometry;
+    rqt_region *region;
+    rqt_rule *rule;
+    rqt_message why;
+    int asked = 0;
+    assert_int_equal(rqt_geometry_parse(text, sizeof text - 1, true, &test_allocator, &geometry, &why), RQT_OK);
+    assert_int_equal(rqt_region_create(geometry, &AT_ORIGIN, &lattice, &test_allocator, &region), RQT_OK);
+    assert_int_equal(rqt_rule_create(&lattice, 0, &test_allocator, &rule), RQT_OK);
+    assert_int_equal(rqt_rule_force_border(rule, region, stop_at_once, &asked), RQT_INTERRUPTED);
+    assert_int_equal(asked, 1);
+    rqt_rule_free(rule);
+    rqt_region_free(region);
+    rqt_geometry_free(geometry);
+}
+
 /* Every request for memory refused, once and from then on. */
 static void without_memory_nothing_is_lost(void **state) {
     (void)state;
@@ -815,7 +839,7 @@ static void without_memory_nothing_is_lost(void **state) {
             rqt_status status = rqt_rule_create(&lattice, 0, &test_allocator, &rule);
             assert_true((status == RQT_OK) == (rule != NULL));
             if (status == RQT_OK) status = rqt_rule_set_places(rule, places, 20);
-            if (status == RQT_OK) status = rqt_rule_force_border(rule, region);
+            if (status == RQT_OK) status = rqt_rule_force_border(rule, region, NULL, NULL);
             assert_int_equal(status, test_heap.failures ? RQT_NO_MEMORY : RQT_OK);
             const bool reached = test_heap.failures > 0;
             test_heap.fail_from = 0;
@@ -841,6 +865,7 @@ int main(void) {
         TEST(detail_over_everything_is_the_mesh_of_its_eps),
         TEST(bad_arguments_are_refused),
         TEST(a_lowered_eps_is_rounded_down),
+        TEST(a_long_border_can_be_interrupted),
         TEST(without_memory_nothing_is_lost),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -21,8 +21,13 @@ typedef struct forcing {
     rqt_rule *rule;
     const rqt_lattice *lattice;
     const rqt_region *region;
+    bool (*is_interrupted)(void *context);
+    void *context;
+    unsigned visited;
     rqt_status status;
 } forcing;
+
+#define PATIENCE 4096 /* triangles between two looks whether somebody wants to stop: about a millisecond */
 
 static int32_t least_of(int32_t a, int32_t b, int32_t c) {
     const int32_t d = a < b ? a : b;
@@ -33,6 +38,10 @@ static int32_t most_of(int32_t a, int32_t b, int32_t c) {
 }
 
 static amount visit(forcing *f, rqt_vertex a, rqt_vertex l, rqt_vertex r) {
+    if (++f->visited % PATIENCE == 0 && f->is_interrupted && f->is_interrupted(f->context)) {
+        f->status = RQT_INTERRUPTED;
+        return NONE;
+    }
     const rqt_vertex ca = rqt_vertex_clamp(f->lattice, a), cl = rqt_vertex_clamp(f->lattice, l),
                      cr = rqt_vertex_clamp(f->lattice, r);
     const rqt_relation relation =
@@ -51,10 +60,12 @@ static amount visit(forcing *f, rqt_vertex a, rqt_vertex l, rqt_vertex r) {
     return MIXED;
 }
 
-rqt_status rqt_rule_force_border(rqt_rule *rule, const rqt_region *region) {
+rqt_status rqt_rule_force_border(rqt_rule *rule, const rqt_region *region, bool (*is_interrupted)(void *context),
+                                 void *context) {
     const rqt_lattice *lattice = rule_lattice(rule);
     const int32_t s = 1 << lattice->K;
-    forcing f = {.rule = rule, .lattice = lattice, .region = region};
+    forcing f = {
+        .rule = rule, .lattice = lattice, .region = region, .is_interrupted = is_interrupted, .context = context};
     (void)visit(&f, (rqt_vertex){s, 0}, (rqt_vertex){0, 0}, (rqt_vertex){s, s});
     if (f.status == RQT_OK) (void)visit(&f, (rqt_vertex){0, s}, (rqt_vertex){s, s}, (rqt_vertex){0, 0});
     return f.status;

@@ -312,17 +312,20 @@ bool region_area_meets(const rqt_region *region, rqt_vertex a, rqt_vertex b, rqt
     return region_triangle_init(&t, a, b, c) && polygons_meet(region, &t);
 }
 
+bool region_thin_touches(const rqt_region *region, const region_triangle *t) {
+    region_search s;
+    region_search_begin(&s, region->nodes + region->thin_tree, region->thin.count, &t->box);
+    for (size_t i; region_search_next(&s, &i);)
+        if (region_triangle_is_touched(t, &region->thin.items[i])) return true;
+    return false;
+}
+
 bool rqt_region_meets(const rqt_region *region, rqt_vertex a, rqt_vertex b, rqt_vertex c) {
     if (region->all) return true;
     region_triangle t;
     if (!region_triangle_init(&t, a, b, c)) return false;
     if (!region->has_box || !region_boxes_touch(&t.box, &region->box)) return false;
-    if (polygons_meet(region, &t)) return true;
-    region_search s;
-    region_search_begin(&s, region->nodes + region->thin_tree, region->thin.count, &t.box);
-    for (size_t i; region_search_next(&s, &i);)
-        if (region_triangle_is_touched(&t, &region->thin.items[i])) return true;
-    return false;
+    return polygons_meet(region, &t) || region_thin_touches(region, &t);
 }
 
 static rqt_relation polygon_relation(const rqt_region *region, const region_polygon *polygon,
@@ -385,8 +388,9 @@ static bool polygon_touches(const rqt_region *region, const region_polygon *poly
     region_search_begin(&s, region->nodes + polygon->tree, polygon->count, box);
     for (size_t i; region_search_next(&s, &i);)
         if (region_box_is_touched(box, &region->border.items[polygon->first + i])) return true;
-    return is_inside(region, polygon,
-                     (region_point){box->x0, box->y0}); /* no border in it: all of it, or nothing */
+    const region_point any = {box->x0,
+                              box->y0}; /* there is no border in the box: all of it is inside, or nothing */
+    return is_inside(region, polygon, any);
 }
 
 bool region_touches(const rqt_region *region, const region_box *box) {
@@ -441,14 +445,6 @@ bool region_holds(const rqt_region *region, const region_fine_point *p) {
     region_search_begin(&s, region->nodes, region->polygon_count, &place);
     for (size_t i; region_search_next(&s, &i);)
         if (is_inside_fine(region, &region->polygons[i], p)) return true;
-    return false;
-}
-
-bool region_thin_touches(const rqt_region *region, const region_triangle *t) {
-    region_search s;
-    region_search_begin(&s, region->nodes + region->thin_tree, region->thin.count, &t->box);
-    for (size_t i; region_search_next(&s, &i);)
-        if (region_triangle_is_touched(t, &region->thin.items[i])) return true;
     return false;
 }
 

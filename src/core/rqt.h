@@ -546,8 +546,9 @@ rqt_status rqt_rule_set_places(rqt_rule *rule, const rqt_rule_place *places, siz
 rqt_status rqt_rule_force(rqt_rule *rule, rqt_vertex v);
 /* Mode `border`: force whatever makes the border of R' a union of edges, where R' is the union of the unit half
  * cells whose interior meets that of R, the members of the region with an area. The leaves that meet R then tile
- * R'. See border.c. */
-rqt_status rqt_rule_force_border(rqt_rule *rule, const rqt_region *region);
+ * R'. See border.c. is_interrupted may be NULL; RQT_INTERRUPTED: some are forced, and the rule is of no use. */
+rqt_status rqt_rule_force_border(rqt_rule *rule, const rqt_region *region, bool (*is_interrupted)(void *context),
+                                 void *context);
 
 /* The largest code that an error may have without the vertex being selected for it; -1: none. */
 int32_t rqt_rule_threshold(const rqt_rule *rule, rqt_vertex v);

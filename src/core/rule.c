@@ -17,14 +17,17 @@
  *
  * Blocks. Every vertex of the closed cell of a block, except its corners, descends from the cell's centre C
  * (summary.c). So their thresholds are not below threshold(C), and one of them is a forced vertex or an ancestor of
- * one iff C is. Hence, for a block of stride > 1, with em the largest error of any vertex in the cell that is finer
- * than its stride: em <= threshold(C) and C is not forced: whatever is selected in the cell is a vertex of the
- * block's grid with an error above em, which sparse blocks keep: the block is *answered*, and can be walked alone;
- *     else C is selected, as e_sat(C) >= em > threshold(C), or as it is forced; and the children are asked.
- * The second is what walks rely on (query.c: the centre of an answer's parent is selected). em and being forced are
- * inherited upwards and thresholds fall, so the blocks above one that is not answered are not answered either: over
- * each place there is exactly one block that answers, and it is, or is below, the one that answers eps alone.
- * Unlike there, a block with em equal to its parent's may answer.
+ * one iff C is. Let em be the largest error of any vertex in the cell that is finer than the block's stride,
+ * infinite where one of them has an outline bit that counts. A block of stride > 1 is *answered*, and can be walked
+ * alone, iff em <= threshold(C) and C is not forced: then all that is selected in the cell is of the block's grid,
+ * with an error above em or the outline bit, and that is what sparse blocks keep. Else its children are asked.
+ *
+ * And then C is selected: as e_sat(C) >= em > threshold(C), or by its outline bit, or as it is forced. That is what
+ * walks rely on (query.c: the centre of an answer's parent is selected). em and being forced are inherited upwards
+ * and thresholds fall, so above a block that is not answered there is none that is: over each place exactly one
+ * block answers, and it is, or lies below, the one that answers eps alone. Unlike there, a block with em equal to
+ * its parent's may answer. Why not by the places that meet the block's own extent, grown by one and a half strides,
+ * as one might think: that is the reach of what is finer than the stride, but vertices of the grid are missing too.
  *
  * Thresholds are not stored. A question about one vertex goes through a tree of the places' boxes and stops at the
  * first place that selects it. */
