@@ -46,9 +46,11 @@ const function rqt_functions[] = {
     {.name = "rqt_range",
      .arguments = MESH,
      .returns = "x, y, z, error, level",
-     .purpose = "The vertices of the mesh of a region, each once. error: the stored saturated error in metres, "
-                "infinite at the "
-                "root's corners; level 0 is the coarsest. gpkg: the vertex as a GeoPackage POINT Z.",
+     .purpose =
+         "The vertices of the mesh of a region, each once. error: the stored saturated error in metres, "
+         "infinite at the "
+         "root's corners; level 0 is the coarsest. Mode cut: vertices between samples have error 0 and no level. "
+         "gpkg: the vertex as a GeoPackage POINT Z.",
      .example = "SELECT count(*) FROM rqt_range(" SUMMIT ", 10)",
      .fill = fill_range,
      .hidden = "col, row, q, achieved_eps, gpkg"},
@@ -57,7 +59,7 @@ const function rqt_functions[] = {
      .returns = "id, x0, y0, z0, x1, y1, z1, x2, y2, z2",
      .purpose = "The triangles of the mesh of a region, counter-clockwise seen from above. gpkg: the triangle as a "
                 "GeoPackage POLYGON Z, for layers; as a result of OGR write +gpkg AS geom.",
-     .example = "SELECT count(*), max(z0) FROM rqt_triangles(" SUMMIT ", 10)",
+     .example = "SELECT count(*), max(z0) FROM rqt_triangles(" SUMMIT ", 10, NULL, '{\"mode\":\"cut\"}')",
      .fill = fill_triangles,
      .hidden = "achieved_eps, gpkg"},
     {.name = "rqt_strip",
@@ -74,7 +76,8 @@ const function rqt_functions[] = {
      .returns = "BLOB, TEXT for obj",
      .purpose = "The mesh of a region as a file's bytes; format: strip, indexed, rqt (src/core/FORMAT.md; rqt "
                 "takes about a byte a vertex), obj, ply, wkb, gpkg, spatialite; ply+normals, rqt+normals: with the "
-                "terrain's normal at every vertex, from the full-resolution samples around it.",
+                "terrain's normal at every vertex, from the full-resolution samples around it. Of mode cut and "
+                "frames only obj, ply, wkb, gpkg, spatialite.",
      .example = "SELECT length(rqt_mesh(" SUMMIT ", 10, 'ply'))",
      .call = call_mesh,
      .least = 3,
@@ -95,11 +98,12 @@ const function rqt_functions[] = {
     {.name = "rqt_verify",
      .arguments = MESH,
      .returns = "samples, vertices, triangles, max_error, rms_error, x, y, t_junctions, overlaps, uncovered, area",
-     .purpose = "Proves the mesh of a region: rasterises its triangles over the full-resolution samples. max_error "
-                "in metres, at "
-                "x, y; uncovered: samples inside the region that the outline promises and no triangle covers; area "
-                "in CRS units "
-                "squared.",
+     .purpose =
+         "Proves the mesh of a region: rasterises its triangles over the full-resolution samples. max_error "
+         "in metres, at "
+         "x, y; uncovered: samples inside the region that the outline promises and no triangle covers; area "
+         "in CRS units "
+         "squared. Mode cut: heights between samples are doubles, so deviations count less 2^-20 of a height step.",
      .example = "SELECT max_error <= 10, t_junctions, overlaps, uncovered FROM rqt_verify(" SUMMIT ", 10)",
      .fill = fill_verify,
      .hidden = "void_touched, twice_area_in_cells, half_cells, achieved_eps"},

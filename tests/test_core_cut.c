@@ -499,11 +499,118 @@ static void shares_are_the_nearest(void **state) {
     mpz_clears(n, part, whole, q, NULL);
 }
 
+/* Two regions with a common border: along it both cuts have the same vertices, heights bit for bit. And one region
+ * in two parts has the area of the whole. */
+static void neighbours_share_the_vertices_of_their_border(void **state) {
+    (void)state;
+    random_begin(__func__);
+    for (int n = 0; n < 20; n++) {
+        model m;
+        database d;
+        model_create(&m, raster_make(SURFACE_HILLS, random_between(9, 40), random_between(9, 40), -1));
+        assert_int_equal(database_create(&d, &m, 2, &test_allocator), RQT_OK);
+        const double w = m.r.width, h = m.r.height, x0 = random_between(0, 64) / 64.0 * w,
+                     x1 = random_between(0, 64) / 64.0 * w;
+        char text[2][400];
+        snprintf(text[0], sizeof text[0], "POLYGON((-1 -1,%.17g -1,%.17g %.17g,-1 %.17g,-1 -1))", x0, x1, h, h);
+        snprintf(text[1], sizeof text[1], "POLYGON((%.17g -1,%.17g %.17g,%.17g %.17g,%.17g -1,%.17g -1))", x0, x1,
+                 h, w, h, w, x0);
+        rqt_cut cut[2];
+        long double area = 0;
+        for (int i = 0; i < 2; i++) {
+            rqt_region *region = region_of_shape(text[i], &d.lattice);
+            rqt_patch patch;
+            assert_int_equal(database_query(&d, region, rqt_code_floor(5), RQT_SELECT_THRESHOLD, RQT_OUTLINE_EXACT,
+                                            &test_allocator, &patch),
+                             RQT_OK);
+            assert_int_equal(rqt_cut_make(&patch, region, &d.lattice, &test_allocator, NULL, NULL, &cut[i]),
+                             RQT_OK);
+            area += check_mesh(&cut[i], d.lattice.K, "half");
+            rqt_patch_free(&patch);
+            rqt_region_free(region);
+        }
+        CHECK(fabsl(area - (long double)(m.r.width - 1) * (m.r.height - 1)) < 1e-9L, "area %.15Lg", area);
+        size_t shared = 0;
+        for (size_t i = 0; i < cut[0].vertex_count; i++) {
+            const rqt_cut_vertex *v = &cut[0].vertices[i];
+            const double off = (x1 - x0) * (v->row + 1) - (h + 1) * (v->col - x0);
+            if (fabs(off) > 1e-7) continue;
+            bool found = false;
+            for (size_t j = 0; j < cut[1].vertex_count && !found; j++)
+                found = memcmp(v, &cut[1].vertices[j], sizeof *v) == 0;
+            CHECK(found, "(%.17g, %.17g) is one side's alone", v->col, v->row);
+            shared++;
+        }
+        if (fmin(x0, x1) > 1 && fmax(x0, x1) < w - 2) CHECK(shared >= 2, "%zu vertices on the border", shared);
+        rqt_cut_free(&cut[0]);
+        rqt_cut_free(&cut[1]);
+        database_free(&d, &test_allocator);
+        model_free(&m);
+    }
+}
+
+static int looks;
+static bool stops(void *context) {
+    return ++looks >= *(const int *)context;
+}
+
+/* Each allocation fails once: no memory, nothing kept, nothing leaked. So does a caller who has had enough. */
+static void F48_no_memory_and_interrupt_leave_nothing(void **state) {
+    (void)state;
+    random_begin(__func__);
+    model m;
+    database d;
+    static shape s;
+    model_create(&m, raster_make(SURFACE_HILLS, 33, 29, 5));
+    assert_int_equal(database_create(&d, &m, 3, &test_allocator), RQT_OK);
+    do (void)random_shape(&s, 33, 29);
+    while (s.members < 2);
+    rqt_region *region = region_of_shape(s.text, &d.lattice);
+    rqt_patch patch;
+    rqt_cut cut;
+    assert_int_equal(
+        database_query(&d, region, 0, RQT_SELECT_THRESHOLD, RQT_OUTLINE_EXACT, &test_allocator, &patch), RQT_OK);
+    const size_t live = test_heap.live;
+    test_heap.calls = 0;
+    assert_int_equal(rqt_cut_make(&patch, region, &d.lattice, &test_allocator, NULL, NULL, &cut), RQT_OK);
+    const size_t calls = test_heap.calls;
+    rqt_cut_free(&cut);
+    CHECK(calls > 8, "%zu allocations", calls);
+    for (size_t n = 1; n <= calls; n++) {
+        test_heap.calls = 0;
+        test_heap.fail_from = test_heap.fail_to = n;
+        assert_int_equal(rqt_cut_make(&patch, region, &d.lattice, &test_allocator, NULL, NULL, &cut),
+                         RQT_NO_MEMORY);
+        assert_true(!cut.vertices && !cut.triangles && cut.triangle_count == 0);
+        assert_int_equal(test_heap.live, live);
+    }
+    for (size_t n = 1; n < 40; n++) { /* and snapping */
+        rqt_region *snapped;
+        test_heap.calls = 0;
+        test_heap.fail_from = test_heap.fail_to = n;
+        const rqt_status status = rqt_region_snap(region, &d.lattice, &test_allocator, &snapped);
+        assert_int_equal(status, test_heap.calls >= n ? RQT_NO_MEMORY : RQT_OK);
+        rqt_region_free(snapped);
+        assert_int_equal(test_heap.live, live);
+    }
+    test_heap.fail_from = test_heap.fail_to = 0;
+    int most = 1;
+    assert_int_equal(rqt_cut_make(&patch, region, &d.lattice, &test_allocator, stops, &most, &cut),
+                     RQT_INTERRUPTED);
+    assert_true(looks == 1 && !cut.vertices);
+    rqt_patch_free(&patch);
+    rqt_region_free(region);
+    database_free(&d, &test_allocator);
+    model_free(&m);
+}
+
 int main(void) {
     random_announce();
     const struct CMUnitTest tests[] = {
         TEST(shares_are_the_nearest),
         TEST(faces_tile_the_leaf_whatever_rounding_does),
+        TEST(neighbours_share_the_vertices_of_their_border),
+        TEST(F48_no_memory_and_interrupt_leave_nothing),
         TEST(F26_polygons_of_all_kinds_are_cut_to_their_area),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

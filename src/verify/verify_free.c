@@ -29,7 +29,10 @@ typedef struct free_vertex {
 
 typedef struct free_edge {
     size_t low, high; /* vertices */
+    size_t third;     /* the triangle's other corner, which is no junction in a triangle of no area; else NONE */
 } free_edge;
+
+#define NONE SIZE_MAX
 
 typedef struct free_mesh {
     const verify_samples *samples;
@@ -168,8 +171,9 @@ static int compare_vertices(const void *left, const void *right) {
 
 static int compare_edges(const void *left, const void *right) {
     const free_edge *a = left, *b = right;
-    const int order = (a->low > b->low) - (a->low < b->low);
-    return order != 0 ? order : (a->high > b->high) - (a->high < b->high);
+    int order = (a->low > b->low) - (a->low < b->low);
+    if (order == 0) order = (a->high > b->high) - (a->high < b->high);
+    return order != 0 ? order : (a->third > b->third) - (a->third < b->third);
 }
 
 static free_vertex vertex_of(const free_mesh *m, size_t t, int k) {
@@ -248,7 +252,7 @@ static uint64_t count_inside(const free_mesh *m, const free_vertex *v, size_t co
         const int32_t last = (int32_t)floor(fmax(from, to)) + 1;
         for (size_t i = lower_bound(v, count, &first); i < count && v[i].square_y == row && v[i].square_x <= last;
              i++)
-            found += is_inside_edge(a, b, v[i].at);
+            found += i != e->third && is_inside_edge(a, b, v[i].at);
     }
     return found;
 }
@@ -266,16 +270,23 @@ static void measure_vertices(const free_mesh *m, free_vertex *v, size_t count, f
             report->void_touched += !s->valid[verify_index(s, v[i].square_x, v[i].square_y)];
     size_t edge_count = 0;
     for (size_t t = 0; t < m->n; t++) {
-        if (cross(m->corner[t][0], m->corner[t][1], m->corner[t][2]) == 0) continue;
+        const bool flat = cross(m->corner[t][0], m->corner[t][1], m->corner[t][2]) == 0;
+        size_t at[3];
+        for (int k = 0; k < 3; k++) at[k] = index_of(v, kept, vertex_of(m, t, k));
         for (int k = 0; k < 3; k++) {
-            const size_t from = index_of(v, kept, vertex_of(m, t, k)),
-                         to = index_of(v, kept, vertex_of(m, t, (k + 1) % 3));
-            edges[edge_count++] = from < to ? (free_edge){from, to} : (free_edge){to, from};
+            const size_t from = at[k], to = at[(k + 1) % 3], third = flat ? at[(k + 2) % 3] : NONE;
+            edges[edge_count++] = from < to ? (free_edge){from, to, third} : (free_edge){to, from, third};
         }
     }
     qsort(edges, edge_count, sizeof *edges, compare_edges);
-    for (size_t e = 0; e < edge_count && inside < VERIFY_COUNT_CAP; e++)
-        if (e == 0 || compare_edges(&edges[e - 1], &edges[e]) != 0) inside += count_inside(m, v, kept, &edges[e]);
+    for (size_t e = 0, next; e < edge_count && inside < VERIFY_COUNT_CAP; e = next) {
+        /* What one triangle leaves out another may not: only what all leave out is left out. */
+        free_edge edge = edges[e];
+        for (next = e + 1; next < edge_count && edges[next].low == edge.low && edges[next].high == edge.high;
+             next++)
+            if (edges[next].third != edge.third) edge.third = NONE;
+        inside += count_inside(m, v, kept, &edge);
+    }
     report->t_junctions = (inside < VERIFY_COUNT_CAP ? inside : VERIFY_COUNT_CAP) + height_pairs;
 }
 
