@@ -499,6 +499,111 @@ static void paths_follow_geodesics(void **state) {
     assert_non_null(strstr(message, "too long"));
 }
 
+/* ------------------------------------------------------------------------------------------------ frames */
+
+static void textbook_ecef(const double p[3], double xyz[3]) {
+    const double a = 6378137, f = 1 / 298.257223563, e2 = f * (2 - f), degree = 0.017453292519943295;
+    const double sine = sin(p[1] * degree), cosine = cos(p[1] * degree), n = a / sqrt(1 - e2 * sine * sine);
+    xyz[0] = (n + p[2]) * cosine * cos(p[0] * degree);
+    xyz[1] = (n + p[2]) * cosine * sin(p[0] * degree);
+    xyz[2] = (n * (1 - e2) + p[2]) * sine;
+}
+
+static void places_in_space_are_the_textbooks(void **state) {
+    (void)state;
+    start_dice(16);
+    geo_frame *ecef, *enu;
+    assert_int_equal(geo_frame_create(GEO_ECEF, 0, 0, 0, &ecef, NULL, 0), GEO_OK);
+    const double origin[3] = {dice(-180, 180), dice(-89, 89), 0};
+    assert_int_equal(geo_frame_create(GEO_ENU, origin[0], origin[1], 0, &enu, NULL, 0), GEO_OK);
+    double o[3];
+    textbook_ecef(origin, o);
+    for (int n = 0; n < 1000; n++) {
+        const double p[3] = {dice(-540, 540), dice(-90, 90), dice(-11000, 9000)};
+        double mine[3], right[3], local[3];
+        geo_frame_place(ecef, p, mine);
+        textbook_ecef(p, right);
+        for (int i = 0; i < 3; i++) assert_true(fabs(mine[i] - right[i]) < 1e-7);
+        /* east, north, up by the scalar product */
+        const double degree = 0.017453292519943295, sl = sin(origin[0] * degree), cl = cos(origin[0] * degree),
+                     sp = sin(origin[1] * degree), cp = cos(origin[1] * degree);
+        const double axes[3][3] = {{-sl, cl, 0}, {-sp * cl, -sp * sl, cp}, {cp * cl, cp * sl, sp}};
+        geo_frame_place(enu, p, local);
+        for (int i = 0; i < 3; i++) {
+            double v = 0;
+            for (int k = 0; k < 3; k++) v += axes[i][k] * (right[k] - o[k]);
+            assert_true(fabs(local[i] - v) < 1e-6);
+        }
+    }
+    geo_frame_free(ecef);
+    geo_frame_free(enu);
+}
+
+/* Brute force: no place of any triangle of a rank, clamped ones too, is further from where it is drawn than the
+ * bound says; and the bound is not idle. */
+static void F29_flat_triangles_are_off_by_no_more_than_the_bound(void **state) {
+    (void)state;
+    start_dice(29);
+    enum { RANKS = 30 };
+    double idle = 0;
+    for (int n = 0; n < 400; n++) {
+        geo_frame *f;
+        const int geoid = n % 4 == 3;
+        assert_int_equal(geo_frame_create(GEO_ECEF, 0, 0, geoid, &f, NULL, 0), GEO_OK);
+        const double step = n % 3 == 0 ? 1.0 / 3600 : n % 3 == 1 ? 0.01 : 0.5, samples = 8 + floor(dice(0, 120));
+        geo_extent e = {.west = dice(-180, 180), .lon_step = step * dice(0.5, 2), .lat_step = step};
+        e.south = dice(-90, 90 - samples * e.lat_step);
+        e.north = e.south + samples * e.lat_step;
+        e.east = e.west + samples * e.lon_step;
+        e.lowest = dice(-8000, 1000);
+        e.highest = e.lowest + (n % 2 ? 1 : dice(0, 4000));
+        double metres[RANKS];
+        geo_frame_sag(f, &e, RANKS, metres);
+        for (int rank = 0; rank < RANKS; rank++) {
+            assert_true(metres[rank] >= (rank ? metres[rank - 1] : 0));
+            const double q = ldexp(1, rank / 2);
+            if (2 * q > samples) break;
+            for (int t = 0; t < 6; t++) {
+                /* in units of q: half a square, or half of that, turned somehow, then clamped */
+                static const double shapes[4][3][2] = {{{0, 0}, {2, 0}, {2, 2}},
+                                                       {{0, 0}, {0, 2}, {2, 2}},
+                                                       {{0, 0}, {2, 0}, {1, 1}},
+                                                       {{0, 0}, {0, 2}, {1, 1}}};
+                const int shape = rank % 2 ? t % 2 : 2 + t % 2;
+                const double u = floor(dice(0, samples - 2 * q + 1)), v = floor(dice(0, samples - 2 * q + 1));
+                const double clamp = t < 4 ? samples : u + dice(q, 2 * q);
+                double c[3][3], at[3][3];
+                for (int i = 0; i < 3; i++) {
+                    c[i][0] = e.west + fmin(clamp, u + q * shapes[shape][i][0]) * e.lon_step;
+                    c[i][1] = e.south + (v + q * shapes[shape][i][1]) * e.lat_step;
+                    c[i][2] = t % 3 ? (i % 2 ? e.lowest : e.highest) : dice(e.lowest, e.highest);
+                    geo_frame_place(f, c[i], at[i]);
+                }
+                for (int k = 0; k < 12; k++) {
+                    double w[3] = {dice(0, 1), dice(0, 1), dice(0, 1)}, p[3], there[3], off = 0;
+                    if (k < 3) w[k] = 0; /* on a side: there it is largest */
+                    if (k < 3) w[(k + 1) % 3] = w[(k + 2) % 3] = 1;
+                    const double sum = w[0] + w[1] + w[2];
+                    for (int i = 0; i < 3; i++) p[i] = (w[0] * c[0][i] + w[1] * c[1][i] + w[2] * c[2][i]) / sum;
+                    geo_frame_place(f, p, there);
+                    for (int i = 0; i < 3; i++) {
+                        const double flat = (w[0] * at[0][i] + w[1] * at[1][i] + w[2] * at[2][i]) / sum;
+                        off += (there[i] - flat) * (there[i] - flat);
+                    }
+                    off = sqrt(off);
+                    if (off > metres[rank])
+                        fail_msg("rank %d, step %g at %g: off by %g, bound %g", rank, step, e.south, off,
+                                 metres[rank]);
+                    if (off > 0.01) idle = fmax(idle, off / metres[rank]);
+                }
+            }
+        }
+        geo_frame_free(f);
+    }
+    print_message("the bound is met to %.0f %%\n", 100 * idle);
+    assert_true(idle > 0.7);
+}
+
 static void test_version(void **state) {
     (void)state;
     int major = 0, minor = 0;
@@ -523,6 +628,8 @@ int main(void) {
         cmocka_unit_test(ellipsoids_are_read_out_of_wkt),
         cmocka_unit_test(planimetric_areas_are_those_of_geodesic_polygons),
         cmocka_unit_test(paths_follow_geodesics),
+        cmocka_unit_test(places_in_space_are_the_textbooks),
+        cmocka_unit_test(F29_flat_triangles_are_off_by_no_more_than_the_bound),
         cmocka_unit_test(test_version),
     };
     return cmocka_run_group_tests(tests, set_up, NULL);
