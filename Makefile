@@ -119,6 +119,12 @@ test-quick: ## the tests without the sanitized build
 	@$(MAKE) --no-print-directory -j2 products test-programs
 	@BUILD=$(BUILD) ./tests/run.sh quick
 
+.PHONY: test-qgis
+test-qgis: ## install QGIS, and open and draw in it, without a screen, what rqt writes: pictures in build/qgis
+	@./src/install-packages.sh build test qgis
+	@$(MAKE) --no-print-directory -j2 products
+	@RQT=$(BUILD)/rqt RQT_SO=$(BUILD)/rqt.so /usr/bin/python3 tests/qgis/test_qgis.py $(BUILD)/qgis
+
 .PHONY: mutants
 mutants: ## break the code in one line, many times over: each time a named test must go red
 	@./src/install-packages.sh build test

@@ -209,6 +209,7 @@ refuses "mesh: no ending" 2 "the file ends in" $M --eps 1 -o .obj
 refuses "mesh: an unknown outline" 2 "there is no such outline; there are exact and tol" $M --eps 1 --outline x -o a.obj
 refuses "mesh: an unknown mode" 2 "there is no such mode" $M --eps 1 --mode x -o a.obj
 refuses "mesh: a list of eps for a model" 2 "--eps takes one number" $M --eps 1,2 -o a.obj
+refuses "mesh: normals in a file that holds none" 2 "a.obj holds no normals; a .ply does" $M --eps 1 --normals -o a.obj
 refuses "mesh: too narrow" 2 "--width 100" $M --eps 1 --width 100 -o a.png
 refuses "mesh: the database itself" 2 "is the database itself" $M --eps 1 -o ./t.gpkg
 ln -s t.gpkg link.gpkg
@@ -265,6 +266,9 @@ for kind in obj ply gpkg svg png; do
     [ $status = 0 ] && [ -s cut.$kind ] && [ "$got" = "$want" ] && [ "$want" -gt 20 ]
     ok "mesh: mode cut as .$kind" $? "$got, not $want; $(cat err)"
 done
+rqt $M --eps 2 --normals -o n.ply
+sqlite3 t.gpkg -cmd ".load $RQT_SO" "SELECT writefile('sql.ply', rqt_mesh(NULL, 2, 'ply+normals', 'hill'))" >/dev/null 2>&1
+[ -s n.ply ] && cmp -s n.ply sql.ply && grep -aq 'property float nz' n.ply; ok "mesh --normals: SQL's bytes, with normals" $? "$(cat err)"
 if command -v gdal_translate >/dev/null; then
     gdal_translate -q -a_srs EPSG:32633 hill.asc utm.tif 2>/dev/null
     rqt import utm.tif utm.gpkg

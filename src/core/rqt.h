@@ -797,6 +797,7 @@ rqt_status rqt_mesh_decode(const uint8_t *bytes, size_t size, rqt_mesh_header *h
 
 typedef struct rqt_wire_header {
     bool is_delta;
+    bool has_normals; /* rqt_wire_normals has something to give; never for an increment */
     rqt_lattice lattice;
     int k;                                 /* block size of the terrain: the order of the walk depends on it */
     uint64_t vertex_count, triangle_count; /* of the mesh; of an increment: of the mesh that it ends in */
@@ -830,6 +831,22 @@ rqt_status rqt_wire_decode(const uint8_t *bytes, size_t size, bool wants_leaves,
 rqt_status rqt_wire_apply(const rqt_wire_header *state_header, const rqt_patch *state, const uint8_t *bytes,
                           size_t size, const rqt_allocator *allocator, rqt_wire_header *header, rqt_patch *patch,
                           rqt_message *message);
+/* Normals beside a mesh: unit vectors of the terrain at its vertices, x east, y north, z up, z > 0 but for
+ * rounding; two bytes each. _pack: to the nearest of its 255 x 255 directions, 0.56 degrees off at worst, straight
+ * up exactly; _unpack: a unit vector. */
+void rqt_normal_pack(const float normal[3], int8_t packed[2]);
+void rqt_normal_unpack(const int8_t packed[2], float normal[3]);
+/* Appends them, 3 floats a vertex in the patch's order, to what rqt_wire_encode wrote; bytes has room for
+ * rqt_wire_normals_bound more. RQT_INVALID for an increment, another number of vertices, or a mesh that has some.
+ */
+size_t rqt_wire_normals_bound(size_t vertex_count);
+rqt_status rqt_wire_add_normals(const float *normals, size_t vertex_count, const rqt_allocator *allocator,
+                                uint8_t *bytes, size_t *size);
+/* The normals of a mesh that rqt_wire_decode has read, which has vertex_count vertices; normals has room for three
+ * floats each. Trusts nothing, as rqt_wire_decode; RQT_INVALID when they are none, or of another number of
+ * vertices. */
+rqt_status rqt_wire_normals(const uint8_t *bytes, size_t size, size_t vertex_count, const rqt_allocator *allocator,
+                            float *normals, rqt_message *message);
 /* What an increment knows a mesh by: its vertices, their levels and heights, and its leaves, in their order. */
 uint64_t rqt_wire_digest(const rqt_patch *patch);
 

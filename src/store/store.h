@@ -118,6 +118,10 @@ void store_limit_methods(store *s, size_t bytes);
 /* Full-resolution samples of a window inside the raster, for width*height values each, row by row. */
 int store_window(store *s, const store_terrain *t, int32_t col, int32_t row, int32_t width, int32_t height,
                  int32_t *q, uint8_t *valid, char **error);
+/* Unit normals of the terrain at the vertices of a patch, from the full-resolution samples around each (normals.c
+ * has the definition): x east, y north, z up, three floats a vertex, released with sqlite3_free. Vertices have to
+ * be samples of the raster. */
+int store_normals(store *s, const store_terrain *t, const rqt_patch *patch, float **normals, char **error);
 /* Height in metres at CRS coordinates on the mesh of eps (eps < 0: full resolution). *found = false over void or
  * outside. */
 int store_height(store *s, const store_terrain *t, double x, double y, double eps, double *metres, bool *found,
