@@ -101,7 +101,9 @@ $(BUILD)/tests/test_%.o: tests/test_%.c $(GENERATED)
 	@mkdir -p $(@D)
 	@echo "  compile $<"; $(CC) $(CFLAGS) $(INCLUDES) -Itests -DSQLITE_CORE $(GDAL_CFLAGS) -c $< -o $@
 $(BUILD)/tests/test_%: $(BUILD)/tests/test_%.o $(BUILD)/tests/libtest.a
-	@$(CXX) $(SANITIZE) -o $@ $^ $(LIBS_TEST)
+	@$(CXX) $(SANITIZE) $(LINK_TEST) -o $@ $^ $(LIBS_TEST)
+# Its own malloc stands before ours, and can say no.
+$(BUILD)/tests/test_fault_memory: LINK_TEST = -Wl,--wrap=malloc,--wrap=calloc,--wrap=realloc
 
 .PHONY: test-programs test test-quick test-sanitize
 test-programs: $(TEST_PROGRAMS)

@@ -2,7 +2,7 @@
  * sentence, and an import leaves the database as it was or wholly done; without faults it then goes on.
  *
  * Every call of SQLite's file system fails once, and then that and all later ones; once more with writes that find
- * a full disk and locks that others hold. A further writing command is one line in `writers`. */
+ * a full disk and locks that others hold. The writers are those of test_fault_support.h. */
 #include "fault_vfs.h"
 #include "test_fault_support.h"
 
@@ -111,36 +111,10 @@ static void F50_a_connection_goes_on_after_a_failing_call(void **unused) {
 }
 
 /* ---------------------------------------------------------------------------------------------- writers -- */
-static int run_import(const char *database) {
-    const char *source = file("second.tif");
-    import_options o = demo_options();
-    return import_many(&source, 1, database, &o);
-}
-
-static int run_replace(const char *database) {
-    const char *source = file("second.tif");
-    import_options o = demo_options();
-    o.minimal = false;
-    o.replace = true;
-    return import_many(&source, 1, database, &o);
-}
-
-typedef struct writer {
-    const char *name;
-    int (*run)(const char *database); /* 0, or 1 with a sentence in `message` */
-    const char *before; /* what makes the database that it finds, out of a demo database; NULL: none */
-} writer;
-
-static const writer writers[] = {
-    {"import into a new database", run_import, NULL},
-    {"import that replaces", run_replace, "PRAGMA journal_mode = delete"},
-    {"import that replaces, WAL", run_replace, "PRAGMA journal_mode = wal"},
-};
-
 static void write_under_faults(const writer *w, const char *origin) {
     const file_path work = path_of("work.gpkg");
     const char *const path = work.text;
-    if (w->before) copy_file(origin, path);
+    writer_prepare(w, origin, path);
     const uint64_t before = w->before ? database_state(path) : 0;
     CHECK(w->run(path) == 0, "%s: %s", w->name, message);
     const uint64_t after = database_state(path);
@@ -149,8 +123,7 @@ static void write_under_faults(const writer *w, const char *origin) {
     for (size_t way = 0; way < LENGTH(ways); way++) {
         long at = 1, old = 0, done = 0, unclear = 0;
         for (;; at += ways[way].later ? 3 : 1) {
-            remove_file_and_company(path);
-            if (w->before) copy_file(origin, path);
+            writer_prepare(w, origin, path);
             const sqlite3_int64 used = sqlite3_memory_used();
             fault_vfs_begin(at, ways[way].later, ways[way].softly);
             const int status = w->run(path);
@@ -184,17 +157,9 @@ static void write_under_faults(const writer *w, const char *origin) {
 
 static void F50_a_writer_leaves_the_database_as_it_was_or_done(void **unused) {
     (void)unused;
-    demo_raster("second.tif", 7);
     for (size_t n = 0; n < LENGTH(writers); n++) {
-        const writer *w = &writers[n];
-        const file_path origin = demo_database("origin.gpkg");
-        if (w->before) {
-            sqlite3 *db;
-            assert_int_equal(sqlite3_open(origin.text, &db), SQLITE_OK);
-            assert_int_equal(sqlite3_exec(db, w->before, NULL, NULL, NULL), SQLITE_OK);
-            sqlite3_close(db);
-        }
-        write_under_faults(w, origin.text);
+        const file_path origin = writer_origin(&writers[n]);
+        write_under_faults(&writers[n], origin.text);
         remove_file_and_company(origin.text);
     }
 }
