@@ -105,8 +105,17 @@ $(BUILD)/tests/test_%: $(BUILD)/tests/test_%.o $(BUILD)/tests/libtest.a
 # Its own malloc stands before ours, and can say no.
 $(BUILD)/tests/test_fault_memory: LINK_TEST = -Wl,--wrap=malloc,--wrap=calloc,--wrap=realloc
 
+# Fuzzers are linked to a driver of their own for the tests, to libFuzzer for `make fuzz`.
+FUZZERS = $(patsubst tests/fuzz/%.c,%,$(wildcard tests/fuzz/fuzz_*.c))
+FUZZ_DRIVER = $(BUILD)/tests/fuzz/driver.o
+$(BUILD)/tests/fuzz/%.o: tests/fuzz/%.c $(GENERATED)
+	@mkdir -p $(@D)
+	@echo "  compile $<"; $(CC) $(CFLAGS) $(INCLUDES) -DSQLITE_CORE -c $< -o $@
+$(BUILD)/tests/fuzz/fuzz_%: $(BUILD)/tests/fuzz/fuzz_%.o $(FUZZ_DRIVER) $(BUILD)/tests/libtest.a
+	@$(CXX) $(SANITIZE) $(LINK_FUZZ) -o $@ $^ $(LIBS_TEST)
+
 .PHONY: test-programs test test-quick test-sanitize
-test-programs: $(TEST_PROGRAMS)
+test-programs: $(TEST_PROGRAMS) $(FUZZERS:%=$(BUILD)/tests/fuzz/%)
 	@:
 
 test: ## install, build, and pass every test (also under ASan and UBSan)
