@@ -114,21 +114,32 @@ $(BUILD)/tests/fuzz/%.o: tests/fuzz/%.c $(GENERATED)
 $(BUILD)/tests/fuzz/fuzz_%: $(BUILD)/tests/fuzz/fuzz_%.o $(FUZZ_DRIVER) $(BUILD)/tests/libtest.a
 	@$(CXX) $(SANITIZE) $(LINK_FUZZ) -o $@ $^ $(LIBS_TEST)
 
-.PHONY: test-programs test test-quick test-sanitize
-test-programs: $(TEST_PROGRAMS) $(FUZZERS:%=$(BUILD)/tests/fuzz/%)
+.PHONY: test-programs fuzz-programs test test-quick
+test-programs: $(TEST_PROGRAMS)
+	@:
+fuzz-programs: $(FUZZERS:%=$(BUILD)/tests/fuzz/%)
 	@:
 
 test: ## install, build, and pass every test (also under ASan and UBSan)
 	@./src/install-packages.sh build test
 	@$(MAKE) --no-print-directory -j2 products test-programs
 	@$(MAKE) --no-print-directory -j2 BUILD=$(BUILD)/sanitized OPTIMIZE=-O1 \
-	  SANITIZE="-fsanitize=address,undefined -fno-sanitize-recover=undefined" products test-programs
+	  SANITIZE="-fsanitize=address,undefined -fno-sanitize-recover=undefined" products test-programs fuzz-programs
 	@BUILD=$(BUILD) ./tests/run.sh
 
 test-quick: ## the tests without the sanitized build
 	@./src/install-packages.sh build test
 	@$(MAKE) --no-print-directory -j2 products test-programs
 	@BUILD=$(BUILD) ./tests/run.sh quick
+
+# clang's libFuzzer steers by what code an input reaches; what it finds stays in build/fuzz/NAME.
+SECONDS ?= 60
+.PHONY: fuzz
+fuzz: ## every fuzzer for SECONDS=60 each, steered by libFuzzer, under ASan and UBSan
+	@./src/install-packages.sh build test fuzz
+	@$(MAKE) --no-print-directory -j2 BUILD=$(BUILD)/fuzz CC=clang-14 CXX=clang++-14 OPTIMIZE=-O1 WARNINGS= FUZZ_DRIVER= LINK_FUZZ=-fsanitize=fuzzer \
+	  SANITIZE="-fsanitize=address,undefined,fuzzer-no-link -fno-sanitize-recover=undefined" fuzz-programs
+	@BUILD=$(BUILD) ./tests/fuzz/run.sh $(SECONDS) $(FUZZERS)
 
 .PHONY: mutants
 mutants: ## break the code in one line, many times over: each time a named test must go red

@@ -40,6 +40,10 @@ export ASAN_OPTIONS=detect_leaks=1:allocator_may_return_null=1
             name=$(basename "$source" .c)
             printf '%s\0' "$name sanitized|$BUILD/sanitized/tests/$name"
         done | awk 'BEGIN { RS = ORS = "\0" } !seen[$0]++'
+        for source in tests/fuzz/fuzz_*.c; do # once, where a sanitizer looks
+            name=$(basename "$source" .c)
+            printf '%s\0' "$name sanitized|$BUILD/sanitized/tests/fuzz/$name"
+        done
     fi
     for source in tests/test_*.c; do
         name=$(basename "$source" .c)

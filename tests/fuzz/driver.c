@@ -1,12 +1,7 @@
-/* driver.c - runs a fuzzer without libFuzzer: over files, then over as many inputs as RQT_FUZZ_RUNS says, made from
- * RQT_SEED, the same on every machine. Ends with `N passed, 0 failed`; a finding aborts, after its input was kept
- * in the file RQT_FUZZ_KEEP, when that is set. */
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+/* driver.c - runs a fuzzer without libFuzzer: over files, then over RQT_FUZZ_RUNS inputs (by default as many as
+ * the fuzzer says) made from RQT_SEED, the same on every machine. Ends with `N passed, 0 failed`; a finding aborts,
+ * after its input was kept in the file RQT_FUZZ_KEEP, when that is set. */
+#include "fuzz.h"
 
 static uint64_t state;
 
@@ -35,7 +30,7 @@ static void run(const uint8_t *bytes, size_t size) {
 int main(int argc, char **argv) {
     static uint8_t bytes[1 << 16];
     const char *wanted = getenv("RQT_FUZZ_RUNS"), *seed = getenv("RQT_SEED");
-    const long runs = wanted ? strtol(wanted, NULL, 10) : 1000;
+    const long runs = wanted ? strtol(wanted, NULL, 10) : fuzz_runs;
     state = seed ? strtoull(seed, NULL, 0) : 1;
     printf("RQT_SEED=%llu RQT_FUZZ_RUNS=%ld\n", (unsigned long long)state, runs);
     (void)fflush(stdout);

@@ -18,6 +18,8 @@
 #include "rqt.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+/* How many inputs the tests take: about a second's, sanitized. */
+extern const long fuzz_runs;
 
 #define HOLD(condition, ...)                                                                     \
     do {                                                                                         \

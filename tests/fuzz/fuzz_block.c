@@ -66,6 +66,8 @@ static void summary(input *in) {
     free(exact);
 }
 
+const long fuzz_runs = 1500;
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     input in = {data, size};
     fuzz_heap heap;

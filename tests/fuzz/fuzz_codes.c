@@ -91,6 +91,8 @@ static void numbers_of_a_tolerance(input *in) {
     if (isfinite(eps)) HOLD(rqt_code_metres(less) <= fmax(0, eps - lost), "eps %g, quantum error %g", eps, lost);
 }
 
+const long fuzz_runs = 20000;
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     input in = {data, size};
     numbers_of_a_lattice(&in);

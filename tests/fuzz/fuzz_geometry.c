@@ -121,6 +121,8 @@ static void look(input *in, const rqt_region *region, const rqt_lattice *l) {
     }
 }
 
+const long fuzz_runs = 8000;
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     input in = {data, size};
     fuzz_heap heap;

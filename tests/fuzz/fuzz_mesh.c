@@ -301,6 +301,8 @@ static void metrics(input *in, const fuzz_terrain *t, const rqt_errors *saturate
     rqt_errors_free(&e, a);
 }
 
+const long fuzz_runs = 250;
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     input in = {data, size};
     fuzz_heap heap;

@@ -133,6 +133,8 @@ static void own_formats(input *in, const wire *w) {
     free(bytes);
 }
 
+const long fuzz_runs = 600;
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     input in = {data, size};
     fuzz_heap heap;
