@@ -172,11 +172,12 @@ check-format: ## fail when a source is not laid out
 .PHONY: docs check-docs
 docs: products ## write ext/SQL.md from the function table
 	@./tests/sql_reference.sh $(BUILD) > ext/SQL.md
-check-docs: ## fail when ext/SQL.md or the README's session are not what the program says
+check-docs: ## fail when ext/SQL.md, the README's session or the list of fuzzers are not what the program says
 	@./src/install-packages.sh build test
 	@$(MAKE) --no-print-directory -j2 products
 	@./tests/sql_reference.sh $(BUILD) | diff -u ext/SQL.md - && echo "ext/SQL.md is what the function table says"
 	@BUILD=$(BUILD) ./tests/check_readme.sh
+	@./tests/check_fuzz.sh
 
 # ---------------------------------------------------------------------------------------------------- benches
 .PHONY: bench bench-data bench-table1 chart peers
