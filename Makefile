@@ -137,7 +137,7 @@ SECONDS ?= 60
 .PHONY: fuzz
 fuzz: ## every fuzzer for SECONDS=60 each, steered by libFuzzer, under ASan and UBSan
 	@./src/install-packages.sh build test fuzz
-	@$(MAKE) --no-print-directory -j2 BUILD=$(BUILD)/fuzz CC=clang-14 CXX=clang++-14 OPTIMIZE=-O1 WARNINGS= FUZZ_DRIVER= LINK_FUZZ=-fsanitize=fuzzer \
+	@$(MAKE) --no-print-directory -j2 BUILD=$(BUILD)/fuzz CC=clang-14 CXX=clang++-14 OPTIMIZE=-O1 WARNINGS=-w FUZZ_DRIVER= LINK_FUZZ=-fsanitize=fuzzer \
 	  SANITIZE="-fsanitize=address,undefined,fuzzer-no-link -fno-sanitize-recover=undefined" fuzz-programs
 	@BUILD=$(BUILD) ./tests/fuzz/run.sh $(SECONDS) $(FUZZERS)
 
