@@ -132,6 +132,14 @@ test-quick: ## the tests without the sanitized build
 	@$(MAKE) --no-print-directory -j2 products test-programs
 	@BUILD=$(BUILD) ./tests/run.sh quick
 
+# What runs on several threads: readers beside a writer, the import's readers and workers, sweeps.
+THREADED = test_fault_threads test_core_sweep test_import_stream
+.PHONY: test-threads
+test-threads: ## what runs on several threads, under ThreadSanitizer
+	@./src/install-packages.sh build test
+	@$(MAKE) --no-print-directory -j2 BUILD=$(BUILD)/threads OPTIMIZE=-O1 WARNINGS=-w SANITIZE=-fsanitize=thread $(THREADED:%=$(BUILD)/threads/tests/%)
+	@BUILD=$(BUILD)/threads PROGRAMS="$(THREADED)" ./tests/run.sh programs
+
 # clang's libFuzzer steers by what code an input reaches; what it finds stays in build/fuzz/NAME.
 SECONDS ?= 60
 .PHONY: fuzz

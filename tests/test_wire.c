@@ -471,7 +471,7 @@ static void mutate(const blob *b, const answer *from, int rounds) {
     free(payload);
 }
 
-static void hostile_bytes_are_refused_or_harmless(void **state) {
+static void F42_hostile_bytes_are_refused_or_harmless(void **state) {
     (void)state;
     random_begin("hostile");
     taken = refused = 0;
@@ -532,7 +532,7 @@ static rqt_status whole_way(const answer *coarse, const answer *fine) {
     return status;
 }
 
-static void a_refused_allocation_is_reported_and_nothing_leaks(void **state) {
+static void F48_a_refused_allocation_is_reported_and_nothing_leaks(void **state) {
     (void)state;
     random_begin("memory");
     raster r = raster_make(SURFACE_HILLS, 65, 50, -1);
@@ -575,8 +575,8 @@ int main(void) {
         TEST(increments_end_in_the_mesh_as_asked_for_at_once),
         TEST(a_chain_of_increments_costs_little_more_than_the_mesh),
         TEST(increments_that_belong_elsewhere_are_refused_with_a_reason),
-        TEST(hostile_bytes_are_refused_or_harmless),
-        TEST(a_refused_allocation_is_reported_and_nothing_leaks),
+        TEST(F42_hostile_bytes_are_refused_or_harmless),
+        TEST(F48_a_refused_allocation_is_reported_and_nothing_leaks),
     };
     return cmocka_run_group_tests_name("wire", tests, NULL, NULL);
 }
