@@ -132,6 +132,14 @@ test-quick: ## the tests without the sanitized build
 	@$(MAKE) --no-print-directory -j2 products test-programs
 	@BUILD=$(BUILD) ./tests/run.sh quick
 
+.PHONY: coverage
+coverage: ## all tests in a build that counts; the core's lines: 100 % but for those of tests/coverage.txt
+	@./src/install-packages.sh build test
+	@$(MAKE) --no-print-directory -j2 BUILD=$(BUILD)/coverage OPTIMIZE=-O1 WARNINGS=-w SANITIZE=--coverage products test-programs
+	@find $(BUILD)/coverage -name '*.gcda' -delete
+	@BUILD=$(BUILD)/coverage ./tests/run.sh quick
+	@/usr/bin/python3 tests/coverage.py $(BUILD)/coverage
+
 # What runs on several threads: readers beside a writer, the import's readers and workers, sweeps.
 THREADED = test_fault_threads test_core_sweep test_import_stream
 .PHONY: test-threads
