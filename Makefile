@@ -185,6 +185,12 @@ check-format: ## fail when a source is not laid out
 	@./src/install-packages.sh format
 	@clang-format --dry-run -Werror $(FORMATTED) && echo "layout: all of $(words $(FORMATTED)) files"
 
+.PHONY: lint
+lint: ## clang-tidy and cppcheck: no finding
+	@./src/install-packages.sh build lint
+	@$(MAKE) --silent --no-print-directory $(GENERATED)
+	@BUILD=$(BUILD) FLAGS="$(INCLUDES) -DSQLITE_CORE $(GDAL_CFLAGS) $(CAIRO_CFLAGS)" ./tests/lint.sh
+
 .PHONY: docs check-docs
 docs: products ## write ext/SQL.md from the function table
 	@./tests/sql_reference.sh $(BUILD) > ext/SQL.md

@@ -33,6 +33,7 @@ export -f run_one
 
 export RQT=$PWD/$BUILD/rqt RQT_SO=$PWD/$BUILD/rqt.so
 export ASAN_OPTIONS=detect_leaks=1:allocator_may_return_null=1
+export TSAN_OPTIONS=suppressions=$PWD/tests/threads.supp
 if [ "$mode" = programs ]; then
     for name in $PROGRAMS; do printf '%s\0' "$name|$BUILD/tests/$name"; done
 else
