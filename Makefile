@@ -140,8 +140,8 @@ coverage: ## all tests in a build that counts; the core's lines: 100 % but for t
 	@BUILD=$(BUILD)/coverage ./tests/run.sh quick
 	@/usr/bin/python3 tests/coverage.py $(BUILD)/coverage
 
-# What runs on several threads: readers beside a writer, the import's readers and workers, sweeps.
-THREADED = test_fault_threads test_core_sweep test_import_stream
+# What runs on several threads: readers beside a writer, the import's reader and workers, which work on sweeps and builds.
+THREADED = test_fault_threads
 .PHONY: test-threads
 test-threads: ## what runs on several threads, under ThreadSanitizer
 	@./src/install-packages.sh build test

@@ -4,6 +4,8 @@
  * runs this under ThreadSanitizer. */
 #include "test_fault_support.h"
 
+#include "parts.h"
+
 #include <pthread.h>
 #include <stdatomic.h>
 
@@ -110,9 +112,39 @@ static void F51_two_readers_and_an_import_never_see_half_a_terrain(void **unused
     sqlite3_close(db);
 }
 
+/* Reader, workers and the writer, with buffers so small that they wait for each other: in memory, and read twice.
+ */
+static void the_threads_of_an_import_make_the_bytes_of_one(void **unused) {
+    (void)unused;
+    enum { WIDTH = 61, HEIGHT = 47 };
+    static double values[WIDTH * HEIGHT];
+    fill(values, WIDTH, HEIGHT, 1);
+    raster r = {.name = "many.tif", .width = WIDTH, .height = HEIGHT, .type = GDT_Int16, .nodata = "303"};
+    const file_path one = path_of("one.gpkg"), many = path_of("many.gpkg");
+    const char *source = write_raster(&r, values);
+    import_options o = demo_options();
+    o.minimal = false;
+    import_fine(source, one.text, &o);
+    for (int twice = 0; twice < 2; twice++) {
+        const import_force force = {.in_memory = !twice,
+                                    .two_readings = twice,
+                                    .b = 4,
+                                    .strip_rows = 4,
+                                    .strips = 3,
+                                    .stage = -1,
+                                    .kept = -1};
+        o.jobs = 3;
+        remove_file_and_company(many.text);
+        CHECK(import_run_forced(&source, 1, many.text, &o, &force, &report, message, sizeof message) == 0, "%s",
+              message);
+        expect_same_tables(one.text, many.text);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(F51_two_readers_and_an_import_never_see_half_a_terrain, begin),
+        cmocka_unit_test_setup(the_threads_of_an_import_make_the_bytes_of_one, begin),
     };
     alarm(300);
     return cmocka_run_group_tests_name("threads", tests, begin_all, end_all);
