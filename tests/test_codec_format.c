@@ -631,6 +631,10 @@ static void a_checksum_ignores_its_field_and_sees_everything_else(void **state) 
     for (int i = 0; i < 32; i++) count[i] = (uint8_t)i;
     assert_true(checksum64(count, 32, 8) == 0xC68F4BD81E12CD32U);
     assert_true(checksum64(count, 29, 8) == 0x86A1F0A799E86B13U);
+    /* A field that is not there changes nothing. */
+    assert_true(checksum64(count, 16, 16) == checksum64(count, 16, 800) &&
+                checksum64(count, 5, 8) == checksum64(count, 5, 800));
+    assert_true(checksum64(count, 16, 16) != checksum64(count, 16, 8));
 }
 
 static void a_sentence_is_cut_where_it_must_and_between_characters(void **state) {

@@ -345,6 +345,23 @@ static void increments_that_belong_elsewhere_are_refused_with_a_reason(void **st
     assert_int_equal(rqt_wire_encode(&coarse.header, coarse.numbers, coarse.count, &coarse.patch, &fine.patch,
                                      &test_allocator, room, &size),
                      RQT_INVALID);
+    /* Leaves finer than the blocks that are said to hold them, and vertices that are not there. */
+    assert_int_equal(rqt_wire_encode(&fine.header, coarse.numbers, coarse.count, &fine.patch, NULL, &test_allocator,
+                                     room, &size),
+                     RQT_INVALID);
+    const size_t fine_is_odd = fine.patch.vertex_count % 2;
+    fine.patch.vertex_count /= 2;
+    assert_int_equal(
+        rqt_wire_encode(&fine.header, fine.numbers, fine.count, &fine.patch, NULL, &test_allocator, room, &size),
+        RQT_INVALID);
+    fine.patch.vertex_count = 2 * fine.patch.vertex_count + fine_is_odd;
+    /* An increment wants the leaves of what it makes finer. */
+    rqt_patch bare;
+    assert_int_equal(rqt_wire_decode(mesh.bytes, mesh.size, false, &test_allocator, &header, &bare, &why), RQT_OK);
+    assert_int_equal(rqt_wire_apply(&header, &bare, delta.bytes, delta.size, &test_allocator, &out, &patch, &why),
+                     RQT_INVALID);
+    CHECK(strstr(why.text, "without its leaves"), "it says: %s", why.text);
+    rqt_patch_free(&bare);
     free(room);
     free(delta.bytes);
     free(later.bytes);
