@@ -13,7 +13,7 @@
 
 static const cli_command *const COMMANDS[] = {&command_import, &command_info, &command_check,
                                               &command_verify, &command_mesh, &command_chart};
-enum { COMMAND_COUNT = sizeof COMMANDS / sizeof *COMMANDS }; /* of pointers. NOLINT(bugprone-sizeof-expression) */
+enum { COMMAND_COUNT = sizeof COMMANDS / sizeof *COMMANDS };
 
 /* In the contract of the command line, and still to come. */
 static const char *const LATER[] = {"update", "serve"};
