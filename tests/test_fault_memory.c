@@ -233,8 +233,8 @@ static void F48_a_writer_survives_every_refused_request(void **unused) {
     for (size_t n = 0; n < LENGTH(writers); n++) {
         const file_path origin = writer_origin(&writers[n]);
         for (int later = 0; later < 2; later++) {
-            const bool first = n == 0;
-            starve_writer(&writers[n], origin.text, !first, later, first ? 1 : later ? 101 : 47);
+            if (!writers[n].before) starve_writer(&writers[n], origin.text, false, later, 1);
+            starve_writer(&writers[n], origin.text, true, later, later ? 101 : 47);
         }
         remove_file_and_company(origin.text);
     }

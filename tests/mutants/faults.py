@@ -17,7 +17,7 @@ MUTANTS = [
      'if (!run(job, d, "COMMIT")) return false;', '(void)run(job, d, "COMMIT");',
      "test_fault_io", "F50_a_writer_leaves_the_database_as_it_was_or_done"),
     ("faults: a new file is left behind", "src/import/database.c",
-     "if (name) unlink(name);", "if (name && i > 0) unlink(name);",
+     "if (n > 0 && (size_t)n < sizeof name) unlink(name);", "if (i > 0 && (size_t)n < sizeof name) unlink(name);",
      "test_fault_io", "F50_a_writer_leaves_the_database_as_it_was_or_done"),
     ("faults: an import without a transaction", "src/import/database.c",
      'if (!run(job, d, "BEGIN IMMEDIATE")) return false;', "",
