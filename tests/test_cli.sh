@@ -316,7 +316,7 @@ for region in 'POINT(1300 2300)' 'LINESTRING(1100 2100,1500 2400)' \
 done
 rqt mesh t.gpkg --terrain my.hole-2 --eps 2,9 -o v.png; [ $status = 0 ]; ok "png with voids" $? "$(cat err)"
 if [ -w /dev/full ]; then
-    "$RQT" info t.gpkg >/dev/full 2>err; [ $? = 1 ] && grep -q 'stdout' err; ok "a full disk under stdout is a failure" $? "$(cat err)"
+    "$RQT" info t.gpkg >/dev/full 2>err; [ $? = 1 ] && grep -q 'stdout' err; ok "F50 a full disk under stdout is a failure" $? "$(cat err)"
 fi
 [ -z "$(ls -A | grep '\.part-')" ]; ok "no temporary file is left" $?
 
@@ -423,7 +423,7 @@ db.execute("BEGIN IMMEDIATE"); open("locked", "w").close(); time.sleep(8)
 PY
 locker=$!
 until [ -e locked ]; do sleep 0.05; done
-refuses "import: a locked database" 1 "locked" import --replace hill.asc t.gpkg
+refuses "F50 import: a locked database" 1 "locked" import --replace hill.asc t.gpkg
 prints "info while another program writes" "hill" info t.gpkg
 kill $locker; wait $locker 2>/dev/null
 
@@ -464,10 +464,10 @@ for moment in 10 40 70 writing; do
                 { [ $status = 0 ] || [ $kind = old ] || [ ! -e k.gpkg ]; } ;;
             KILL) [ $status = 0 ] || [ $status = 137 ] ;;
             esac
-            ok "SIG$signal at $moment, $kind database: status and sentence" $? "$status $(cat stop.err)"
+            ok "F49 SIG$signal at $moment, $kind database: status and sentence" $? "$status $(cat stop.err)"
             rqt info k.gpkg
             ! grep -q '^big' out || [[ $before == *big* ]]; ok "... info shows no half terrain" $? "$(cat out)"
-            is_as_before k.gpkg "$before"; ok "... what was there is there, and sound" $? "expected '$before'; $(ls -l k.gpkg* 2>&1; cat check.out 2>/dev/null)"
+            is_as_before k.gpkg "$before"; ok "F49 ... what was there is there, and sound" $? "expected '$before'; $(ls -l k.gpkg* 2>&1; cat check.out 2>/dev/null)"
         done
     done
 done
@@ -483,7 +483,7 @@ prints "info of a database whose writer was killed rolls back" "my.hole-2" info 
 [ ! -e hot.gpkg-journal ]; ok "... and leaves no journal" $? "$(ls -l hot*)"
 rm -f f.gpkg*; (ulimit -f 2000; "$RQT" import --memory 4000 big.bil f.gpkg >out 2>err)
 [ $? = 1 ] && grep -q 'f.gpkg' err && [ -z "$(ls | grep '^f.gpkg')" ]
-ok "import beyond the limit of file sizes: a sentence, and nothing left" $? "$(cat out err; ls -l f.gpkg* 2>&1)"
+ok "F50 import beyond the limit of file sizes: a sentence, and nothing left" $? "$(cat out err; ls -l f.gpkg* 2>&1)"
 rqt import --name big --replace big.bil k.gpkg; [ $status = 0 ]; ok "importing again works after all that" $? "$(cat err)"
 rqt check k.gpkg; [ $status = 0 ] && grep -q '^big: sound' out; ok "... and is sound" $? "$(cat out err)"
 "$RQT" mesh k.gpkg --terrain big --eps 0 -o stopped.gpkg 2>/dev/null & pid=$!

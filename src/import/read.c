@@ -215,6 +215,7 @@ bool import_reading_open(const import_job *job, const import_source *sources, in
     if (r) {
         *r = (import_reading){.job = job, .sources = sources, .count = count, .mosaic = mosaic};
         r->dataset = calloc((size_t)count, sizeof(GDALDatasetH));
+        /* NOLINTNEXTLINE(clang-analyzer-optin.portability.UnixAPI): a source has samples */
         r->rows = malloc(samples * import_kind_bytes(mosaic->kind));
         r->mask = malloc(masked ? masked : 1);
     }
