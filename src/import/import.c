@@ -164,11 +164,19 @@ static bool is_passed_over(import_work *m, const import_path *path) {
     if (!path->found) return false;
     CPLPushErrorHandler(CPLQuietErrorHandler);
     GDALDatasetH d = GDALOpenEx(path->path, GDAL_OF_RASTER | GDAL_OF_READONLY, NULL, NULL, NULL);
-    const int bands = d ? GDALGetRasterCount(d) : -1;
+    int bands = d ? GDALGetRasterCount(d) : -1;
     if (d) GDALClose(d);
+    /* A GeoPackage of tables, say, is identified and has no raster. */
+    if (!d && (d = GDALOpenEx(path->path, GDAL_OF_VECTOR | GDAL_OF_READONLY, NULL, NULL, NULL)) != NULL) {
+        bands = 0;
+        GDALClose(d);
+    }
     CPLPopErrorHandler();
     if (bands < 0 || bands == 1) return false;
-    import_notice(&m->job, "%s is passed over: it has %d bands, and a terrain has one", path->path, bands);
+    if (bands)
+        import_notice(&m->job, "%s is passed over: it has %d bands, and a terrain has one", path->path, bands);
+    else
+        import_notice(&m->job, "%s is passed over: it holds no raster", path->path);
     return true;
 }
 
@@ -186,7 +194,10 @@ static bool describe_all(import_work *m, const char *const *arguments, int count
             continue;
         }
         import_source_free(s);
-        if (is_passed_over(m, path)) continue;
+        if (is_passed_over(m, path)) {
+            import_refuse(&m->job, "%s", ""); /* it was none */
+            continue;
+        }
         if (path->line) import_paths_place_sentence(&m->job, paths, path);
         return false;
     }
