@@ -8,6 +8,7 @@
 #   examples/national-import.sh
 #   examples/national-import.sh ~/dem25 country.gpkg --nodata -9999
 set -eu
+demo=
 root=$(cd "$(dirname "$0")/.." && pwd)
 case " ${1:-} " in *" -h "* | *" --help "*) sed -n '2,9s/^# \{0,1\}//p' "$0"; exit ;; esac
 rqt=${RQT:-$root/build/rqt} so=${RQT_SO:-$root/build/rqt.so}
@@ -32,9 +33,11 @@ if [ $# = 0 ]; then
             cut -srcwin $((c * 200)) $((10#$r * 200)) $w $h all.vrt "tiles/row$r-col$c.tif"
         done
     done
-    rm tiles/row07-col4.tif
-    cut -scale 0 1000 7 1007 tiles/row04-col1.tif high.tif && mv high.tif tiles/row04-col1.tif
-    set -- tiles pyrenees.gpkg --name pyrenees
+    rm -rf mended && mkdir mended
+    mv tiles/row07-col4.tif tiles/row04-col1.tif mended
+    cut -scale 0 1000 7 1007 mended/row04-col1.tif tiles/row04-col1.tif
+    set -- tiles pyrenees.gpkg --name pyrenees --fill 4
+    demo=yes
 fi
 tiles=$1 database=${2:-national.gpkg}
 shift $(($# > 1 ? 2 : 1))
@@ -60,21 +63,22 @@ echo "# The same command goes on: what was read is not read again. All faults of
 show import --resumable --report faults.geojson "$@" "$tiles" "$database"
 
 echo
-echo "# Faults of the tiles, the worst of each kind"
-if command -v ogrinfo >/dev/null; then
-    ogrinfo -q faults.geojson -dialect SQLite -sql "SELECT kind, count(*) AS findings, sum(samples) AS samples,
-        sum(differ) AS differ, max(largest) AS largest_m FROM \"$(sed -n 's/^"name":"\(.*\)",$/\1/p' faults.geojson)\" GROUP BY kind" |
-        sed -n 's/^  \(.*\) (.*) = \(.*\)/  \1 \2/p' | paste - - - - - | sed 's/^/ /; s/\t */ /g'
-fi
+echo "# What is in that layer"
+sqlite3 -box :memory: "SELECT value ->> '$.properties.kind' AS fault, count(*) AS places, sum(value ->> '$.properties.samples') AS samples,
+    sum(value ->> '$.properties.differ') AS differ, max(value ->> '$.properties.largest') AS most_metres
+    FROM json_each(CAST(readfile('faults.geojson') AS TEXT), '$.features') GROUP BY 1 ORDER BY 1"
 show check "$database"
 show info "$database"
 
 echo
-echo "# A window of 10 km in the middle, at 20 m: a proof and a mesh"
-if command -v sqlite3 >/dev/null; then
-    sqlite3 -box "$database" -cmd ".load $so" "
-        WITH t AS (SELECT x0 + width / 2 * dx AS x, y0 + height / 2 * dy AS y FROM rqt_terrain),
-             w AS (SELECT CASE WHEN lonlat THEN rqt_circle(x, y, 5000) ELSE rqt_bbox(x - 5000, y - 5000, x + 5000, y + 5000) END AS region
-                   FROM t, rqt_terrain)
-        SELECT samples, vertices, triangles, max_error, t_junctions, overlaps, uncovered FROM w, rqt_verify(w.region, 20)"
+if [ "$demo" ] && "$rqt" update --help >/dev/null 2>&1; then
+    echo "# The agency sends the missing tile, and the high one as it should be"
+    show update mended "$database"
+    show check "$database"
+    echo
 fi
+echo "# 10 km in the middle, at 20 m: the mesh, and its proof"
+sqlite3 -box "$database" -cmd ".load $so" "
+    WITH middle AS (SELECT x0 + width / 2 * dx AS x, y0 + height / 2 * dy AS y, lonlat FROM rqt_terrain),
+         area AS (SELECT iif(lonlat, rqt_circle(x, y, 5000), rqt_bbox(x - 5000, y - 5000, x + 5000, y + 5000)) AS region FROM middle)
+    SELECT samples, vertices, triangles, max_error, t_junctions AS cracks, overlaps, uncovered FROM area, rqt_verify(area.region, 20)"

@@ -330,6 +330,19 @@ static void expect_findings(const char *path, int left, int top, int width, int 
                 owner[y][x] = i;
                 value[y][x] = z;
             }
+    /* Samples that no source covers, and from which one gets to the edge through others like them. */
+    static bool outside[SIDE][SIDE];
+    memset(outside, 0, sizeof outside);
+    for (bool more = true; more;) {
+        more = false;
+        for (int y = 0; y < height; y++)
+            for (int x = 0; x < width; x++) {
+                if (covered[y][x] || outside[y][x]) continue;
+                outside[y][x] = x == 0 || y == 0 || x == width - 1 || y == height - 1 || outside[y - 1][x] ||
+                                outside[y + 1][x] || outside[y][x - 1] || outside[y][x + 1];
+                more = more || outside[y][x];
+            }
+    }
     cJSON *json = read_json(path), *feature;
     static int overlaps[12][12];
     memset(overlaps, 0, sizeof overlaps);
@@ -349,6 +362,7 @@ static void expect_findings(const char *path, int left, int top, int width, int 
         assert_true(fabs(west - (500000 + 10.0 * (left + c0))) < 1e-6);
         assert_true(fabs(south - (4000000 - 10.0 * (top + r1 + 1))) < 1e-6);
         if (!strcmp(kind, "gap")) {
+            assert_true(cJSON_IsTrue(cJSON_GetObjectItem(p, "inside")) == !outside[r0][c0]);
             for (int y = r0; y <= r1; y++)
                 for (int x = c0; x <= c1; x++)
                     if (covered[y][x]++) fail_msg("gap at %d, %d: covered, or told twice", x, y);

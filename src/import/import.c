@@ -569,6 +569,25 @@ static bool write_database(import_work *m) {
     return ok;
 }
 
+#define READDIR "GDAL_DISABLE_READDIR_ON_OPEN"
+#define POOL "GDAL_MAX_DATASET_POOL_SIZE"
+
+/* For each dataset GDAL reads its whole folder, to see what stands beside; among thousands of tiles it does better
+ * to ask for the names that it looks for. And a VRT keeps a hundred tiles open, if it may. What the user has set
+ * stays. begin: or put back. */
+static void tune_gdal(const char *const *sources, int count, bool begin, bool set[2]) {
+    bool many = count > 32;
+    for (int i = 0; i < count && !many; i++) many = *sources[i] == '@' || import_is_folder(sources[i]);
+    if (begin) {
+        set[0] = many && !CPLGetConfigOption(READDIR, NULL);
+        set[1] = !CPLGetConfigOption(POOL, NULL);
+    }
+    char most[16];
+    snprintf(most, sizeof most, "%d", import_reading_most_open() < 100 ? import_reading_most_open() : 100);
+    if (set[0]) CPLSetConfigOption(READDIR, begin ? "TRUE" : NULL);
+    if (set[1]) CPLSetConfigOption(POOL, begin ? most : NULL);
+}
+
 int import_run_forced(const char *const *sources, int count, const char *database, const import_options *options,
                       const import_force *force, import_report *report, char *message, size_t message_size) {
     import_work m = {.job = {options, database, message, message_size}, .force = force, .report = report};
@@ -578,6 +597,8 @@ int import_run_forced(const char *const *sources, int count, const char *databas
     /* GDAL's words belong into our sentences, not onto the terminal. */
     CPLPushErrorHandler(CPLQuietErrorHandler);
     GIntBig cache = GDALGetCacheMax64();
+    bool tuned[2];
+    tune_gdal(sources, count, true, tuned);
 
     bool ok =
         check_options(&m.job, count) && name_of(&m.job, sources[0], report->name) && describe(&m, sources, count);
@@ -604,6 +625,7 @@ int import_run_forced(const char *const *sources, int count, const char *databas
     free(m.sources);
     import_paths_free(&m.paths);
     GDALSetCacheMax64(cache);
+    tune_gdal(sources, count, false, tuned);
     CPLPopErrorHandler();
     return ok ? 0 : 1;
 }

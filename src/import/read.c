@@ -220,7 +220,7 @@ size_t import_reading_bytes(const import_source *sources, int count, const impor
 }
 
 /* Sources that may be open at once: a dataset has a file, and often one beside it. */
-static int most_open(void) {
+int import_reading_most_open(void) {
     struct rlimit files;
     if (getrlimit(RLIMIT_NOFILE, &files) || files.rlim_cur == RLIM_INFINITY) return MOST_OPEN;
     const int64_t half = ((int64_t)files.rlim_cur - OTHER_FILES) / 2;
@@ -268,8 +268,11 @@ bool import_reading_open(const import_job *job, const import_source *sources, in
     widest(sources, count, strip_rows, &samples, &masked);
     import_reading *r = *reading = calloc(1, sizeof *r);
     if (r) {
-        *r = (import_reading){
-            .job = job, .sources = sources, .count = count, .mosaic = mosaic, .most_open = most_open()};
+        *r = (import_reading){.job = job,
+                              .sources = sources,
+                              .count = count,
+                              .mosaic = mosaic,
+                              .most_open = import_reading_most_open()};
         r->owner = malloc((size_t)mosaic->lattice.width * (size_t)strip_rows * sizeof *r->owner);
         r->dataset = calloc((size_t)count, sizeof(GDALDatasetH));
         r->rows = malloc(samples * import_kind_bytes(mosaic->kind));

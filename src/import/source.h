@@ -59,6 +59,7 @@ bool import_paths_find(const import_job *job, const char *const *arguments, int 
 /* The sentence about a source that stands in a list, with its line before it. */
 void import_paths_place_sentence(const import_job *job, const import_paths *paths, const import_path *path);
 void import_paths_free(import_paths *paths);
+bool import_is_folder(const char *path);
 /* The last part of a path, without slashes at its end: for the terrain's name. free(). NULL: out of memory */
 char *import_base_of(const char *argument);
 
@@ -149,6 +150,7 @@ void import_reading_close(import_reading *reading);
 bool import_reading_strip(import_reading *reading, import_strip *strip, import_counts *counts);
 /* Sources that disagree in the strip read last. */
 const import_conflicts *import_reading_conflicts(const import_reading *reading);
+int import_reading_most_open(void); /* datasets that may be open at once */
 /* Bytes of the buffers that reading strips takes beside them, and of the cache in which GDAL keeps each of its
  * blocks until all of its rows have been asked for. */
 size_t import_reading_bytes(const import_source *sources, int count, const import_mosaic *mosaic,

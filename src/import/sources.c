@@ -52,14 +52,15 @@ static bool is_same_file(const char *a, const char *b) {
 }
 
 static bool is_raster(const import_job *job, const char *path) {
-    static const char *const beside[] = {".aux.xml", ".ovr", ".msk", ".rqt-import", ".vrt", ".qpj", ".prj", ".tfw"};
+    static const char *const beside[] = {".aux.xml", ".ovr", ".msk", ".hdr", ".rqt-import",
+                                         ".vrt",     ".qpj", ".prj", ".tfw"};
     for (size_t i = 0; i < sizeof beside / sizeof *beside; i++)
         if (ends_with(path, beside[i])) return false;
     if (is_same_file(path, job->database)) return false;
     return ends_with(path, ".zip") || GDALIdentifyDriverEx(path, GDAL_OF_RASTER, NULL, NULL) != NULL;
 }
 
-static bool is_folder(const char *path) {
+bool import_is_folder(const char *path) {
     VSIStatBufL file;
     return VSIStatExL(path, &file, VSI_STAT_EXISTS_FLAG | VSI_STAT_NATURE_FLAG) == 0 && VSI_ISDIR(file.st_mode);
 }
@@ -73,7 +74,7 @@ static bool walk(const import_job *job, import_paths *p, const char *folder, int
         char *path = CPLStrdup(CPLFormFilename(folder, *name, NULL));
         struct stat link;
         const bool linked = !lstat(path, &link) && S_ISLNK(link.st_mode);
-        if (is_folder(path)) {
+        if (import_is_folder(path)) {
             if (!linked && depth < MOST_DEPTH) ok = walk(job, p, path, argument, line, depth + 1);
         } else if (is_raster(job, path)) {
             ok = add(job, p, strdup(path), argument, line, true);
@@ -89,7 +90,7 @@ static bool walk(const import_job *job, import_paths *p, const char *folder, int
 /* ---------------------------------------------------------------------------------------------------- names -- */
 /* A raster, or a folder of them. A folder that GDAL takes for one raster is one. */
 static bool add_name(const import_job *job, import_paths *p, const char *name, int argument, int line) {
-    if (!is_folder(name) || GDALIdentifyDriverEx(name, GDAL_OF_RASTER, NULL, NULL))
+    if (!import_is_folder(name) || GDALIdentifyDriverEx(name, GDAL_OF_RASTER, NULL, NULL))
         return add(job, p, strdup(name), argument, line, false);
     const int before = p->count;
     if (!walk(job, p, name, argument, line, 0)) return false;
@@ -124,7 +125,7 @@ static void place_sentence(const import_job *job, const char *list, int line) {
 }
 
 static bool add_list(const import_job *job, import_paths *p, const char *list, int argument) {
-    VSILFILE *file = is_folder(list) ? NULL : VSIFOpenL(list, "rb");
+    VSILFILE *file = import_is_folder(list) ? NULL : VSIFOpenL(list, "rb");
     if (!file) return import_refuse(job, "%s, a list of sources, cannot be read", list);
     const int before = p->count;
     bool ok = true;
