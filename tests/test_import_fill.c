@@ -332,6 +332,6 @@ int main(void) {
         TEST(a_plane_is_continued_through_its_voids),         TEST(a_whole_sea_and_heights_between_steps),
         TEST(the_table_is_checked_and_goes_with_its_terrain),
     };
-    alarm(300); /* threads that wait for each other for ever are a failure too */
+    alarm(600); /* threads that wait for each other for ever are a failure too */
     return cmocka_run_group_tests(tests, begin_all, end_all);
 }
