@@ -325,12 +325,113 @@ static void the_table_is_checked_and_goes_with_its_terrain(void **unused) {
     free_land(&l);
 }
 
+/* ---------------------------------------------------------------------------------------------------- void-tol --
+ */
+/* Samples that the mesh of outline tol covers, by whole numbers: on the left of, or on, each side. */
+static size_t cover(store *s, const store_terrain *t, double eps, bool *covered) {
+    rqt_region *region = NULL;
+    rqt_patch patch = {0};
+    char *error = NULL;
+    const store_query_options options = {.outline = RQT_OUTLINE_TOL};
+    const int width = t->lattice.width, height = t->lattice.height;
+    memset(covered, 0, (size_t)(width * height));
+    assert_int_equal(rqt_region_create(NULL, &t->placement, &t->lattice, store_allocator(), &region), RQT_OK);
+    if (store_query(s, t, region, eps, &options, &patch, NULL, &error)) fail_msg("%s", error);
+    for (size_t i = 0; i < patch.triangle_count; i++) {
+        const rqt_patch_vertex *v[3];
+        for (int n = 0; n < 3; n++) v[n] = &patch.vertices[patch.triangles[3 * i + (size_t)n]];
+        for (int y = 0; y < height; y++)
+            for (int x = 0; x < width; x++) {
+                bool inside = true;
+                for (int n = 0; n < 3 && inside; n++) {
+                    const rqt_patch_vertex *a = v[n], *b = v[(n + 1) % 3];
+                    /* Rows grow south: counter-clockwise from above is clockwise in columns and rows. */
+                    inside =
+                        (int64_t)(b->col - a->col) * (y - a->row) - (int64_t)(b->row - a->row) * (x - a->col) <= 0;
+                }
+                if (inside) covered[y * width + x] = true;
+            }
+    }
+    const size_t vertices = patch.vertex_count;
+    rqt_patch_free(&patch);
+    rqt_region_free(region);
+    return vertices;
+}
+
+/* What outline exact covers: samples of unit half cells with three valid corners. The diagonal of a cell goes
+ * through the corner whose coordinates are both odd. */
+static void cover_exactly(const land *l, bool *covered) {
+    memset(covered, 0, (size_t)(l->width * l->height));
+    for (int y = 0; y + 1 < l->height; y++)
+        for (int x = 0; x + 1 < l->width; x++) {
+            const int nw = y * l->width + x, ne = nw + 1, sw = nw + l->width, se = sw + 1;
+            const bool main_diagonal = x % 2 == y % 2;
+            const int halves[2][3] = {{main_diagonal ? nw : ne, main_diagonal ? se : sw, main_diagonal ? ne : nw},
+                                      {main_diagonal ? nw : ne, main_diagonal ? se : sw, main_diagonal ? sw : se}};
+            for (int h = 0; h < 2; h++) {
+                const int *v = halves[h];
+                if (isnan(l->values[v[0]]) || isnan(l->values[v[1]]) || isnan(l->values[v[2]])) continue;
+                covered[v[0]] = covered[v[1]] = covered[v[2]] = true;
+            }
+        }
+}
+
+/* A sample that the mesh gains or loses lies within c * eps metres of one of the other kind: the outline has moved
+ * by no more. Cells are 10 m. And it is worth having: with a larger c there are fewer vertices. */
+static void void_tol_moves_an_outline_by_at_most_c_eps(void **unused) {
+    (void)unused;
+    static const double c[] = {0.5, 1, 4}, eps[] = {0, 10, 40, 160};
+    enum { SIDE = 65 };
+    static bool covered[SIDE * SIDE], exact[SIDE * SIDE];
+    int moved = 0;
+    land l = make_land(SIDE, SIDE);
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        l.values[i] /= 20; /* gentle: the outline is what counts */
+        l.values[i] = rint(l.values[i]);
+        const int x = i % SIDE, y = i / SIDE;
+        if (hypot(x - 20, y - 30) < 9 + 3 * sin(x * 0.9) || x + y > 105 + 4 * sin(y * 0.7)) l.values[i] = NAN;
+    }
+    write_land(&l, "a.tif");
+    cover_exactly(&l, exact);
+    for (size_t e = 0; e < LENGTH(eps); e++) {
+        size_t before = SIZE_MAX;
+        for (size_t n = 0; n < LENGTH(c); n++) {
+            import_options o = defaults();
+            o.void_tol = c[n];
+            o.replace = true;
+            import_fine(file("a.tif"), file("a.gpkg"), &o);
+            terrain t = open_terrain(file("a.gpkg"), NULL);
+            assert_true(t.t->cost.c == c[n] && fabs(t.t->cost.cell - 10) < 1e-9);
+            const size_t vertices = cover(t.store, t.t, eps[e], covered);
+            assert_true(vertices <= before);
+            before = vertices;
+            const int reach = (int)floor(c[n] * eps[e] / 10);
+            for (int i = 0; i < SIDE * SIDE; i++) {
+                if (covered[i] == exact[i]) continue;
+                moved++;
+                bool near = false;
+                for (int y = i / SIDE - reach; y <= i / SIDE + reach && !near; y++)
+                    for (int x = i % SIDE - reach; x <= i % SIDE + reach && !near; x++)
+                        near = x >= 0 && y >= 0 && x < SIDE && y < SIDE &&
+                               (exact[y * SIDE + x] != exact[i] ||
+                                isnan(l.values[y * SIDE + x]) != isnan(l.values[i]));
+                if (!near)
+                    fail_msg("c %g, eps %g: sample %d, %d is %scovered, and farther than %d from the outline", c[n],
+                             eps[e], i % SIDE, i / SIDE, covered[i] ? "" : "not ", reach);
+            }
+            close_terrain(&t);
+        }
+    }
+    assert_true(moved > 100);
+    free_land(&l);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
 #define TEST(name) cmocka_unit_test_setup(name, begin)
         TEST(voids_are_filled_as_a_slow_look_says),           TEST(a_void_of_radius_r_is_filled_and_no_larger_one),
         TEST(a_plane_is_continued_through_its_voids),         TEST(a_whole_sea_and_heights_between_steps),
-        TEST(the_table_is_checked_and_goes_with_its_terrain),
+        TEST(the_table_is_checked_and_goes_with_its_terrain), TEST(void_tol_moves_an_outline_by_at_most_c_eps),
     };
     alarm(600); /* threads that wait for each other for ever are a failure too */
     return cmocka_run_group_tests(tests, begin_all, end_all);
