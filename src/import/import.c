@@ -12,6 +12,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -187,7 +188,7 @@ static bool describe_all(import_work *m, const char *const *arguments, int count
     m->sources = calloc((size_t)paths->count, sizeof *m->sources);
     if (!m->sources) return import_no_memory(&m->job, "describing the sources");
     for (int i = 0; i < paths->count; i++) {
-        const import_path *path = &paths->path[i];
+        import_path *path = &paths->path[i];
         import_source *s = &m->sources[m->count];
         if (import_source_describe(&m->job, path->path, s)) {
             if (m->count++) import_source_share_crs(s, &m->sources[0]);
@@ -195,6 +196,7 @@ static bool describe_all(import_work *m, const char *const *arguments, int count
         }
         import_source_free(s);
         if (is_passed_over(m, path)) {
+            path->passed = true;
             import_refuse(&m->job, "%s", ""); /* it was none */
             continue;
         }
@@ -208,6 +210,17 @@ static bool describe_all(import_work *m, const char *const *arguments, int count
     return m->count > 0 || import_refuse(&m->job, "%s holds no raster of one band", arguments[0]);
 }
 
+/* The report replaces a file: not one that is read, nor the database. */
+static bool check_report(const import_work *m) {
+    const char *report = m->job.options->report;
+    struct stat file, other;
+    if (!report || stat(report, &file)) return true;
+    bool same = !stat(m->job.database, &other) && file.st_dev == other.st_dev && file.st_ino == other.st_ino;
+    for (int i = 0; i < m->count && !same; i++)
+        same = !stat(m->sources[i].path, &other) && file.st_dev == other.st_dev && file.st_ino == other.st_ino;
+    return !same || import_refuse(&m->job, "%s is the database or a source, and cannot be the report too", report);
+}
+
 static bool describe(import_work *m, const char *const *arguments, int count) {
     if (!describe_all(m, arguments, count)) return false;
     m->report->sources = m->count;
@@ -217,6 +230,7 @@ static bool describe(import_work *m, const char *const *arguments, int count) {
     m->k = m->job.options->k < m->mosaic.lattice.K ? m->job.options->k : m->mosaic.lattice.K;
     m->cost =
         (rqt_void_cost){.cell = import_crs_cell(&m->crs, &m->mosaic.placement), .c = m->job.options->void_tol};
+    if (!check_report(m)) return false;
     m->spool_path = import_spool_path(m->job.database, m->report->name);
     if (!m->spool_path) return import_no_memory(&m->job, "opening the resume file");
     /* What an earlier run has read is used, whatever fits in memory now. */
@@ -490,7 +504,7 @@ static char *provenance(const import_work *m) {
     for (int a = 0, i = 0; out && a < p->arguments; a++) {
         int rasters = 0;
         bool itself = false;
-        for (; i < p->count && p->path[i].argument == a; i++, rasters++)
+        for (; i < p->count && p->path[i].argument == a; i++, rasters += !p->path[i - 1].passed)
             itself = !p->path[i].line && !p->path[i].found;
         char *base = import_base_of(p->argument[a]);
         whole = whole && base;

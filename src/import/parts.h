@@ -239,7 +239,7 @@ typedef struct import_plan {
 
 /* For tests: what the plan would otherwise choose. 0, or -1 for `stage` and `kept`: chosen. */
 typedef struct import_force {
-    bool in_memory, two_readings, spools;
+    bool in_memory, two_readings;
     int b, strip_rows, strips;
     int64_t stage, kept;
 } import_force;
@@ -282,7 +282,6 @@ bool import_spool_open(const import_job *job, const char *path, const import_spo
 int32_t import_spool_strips(const import_spool *spool); /* that it has */
 int32_t import_spool_found(const import_spool *spool);  /* of them, from an earlier run */
 uint64_t import_spool_bytes(const import_spool *spool);
-const char *import_spool_name(const import_spool *spool);
 /* Strip n with its values, counts and conflicts (NULL: not wanted). False: it is not sound; it and all behind it
  * are forgotten. */
 bool import_spool_read(import_spool *spool, int32_t n, import_strip *strip, import_counts *counts,

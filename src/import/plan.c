@@ -118,7 +118,6 @@ static void spend(const needs *n, import_plan *p, int64_t left) {
 
 static void apply(const import_force *f, import_plan *p) {
     if (f->strip_rows > 0) p->strip_rows = f->strip_rows;
-    if (f->spools) p->spools = true;
     if (f->strips > 0) p->strips = f->strips;
     if (f->stage >= 0) p->stage = (uint64_t)f->stage;
     if (f->kept >= 0) p->kept = (uint64_t)f->kept;

@@ -45,6 +45,7 @@ typedef struct import_path {
     int32_t argument; /* the name that it comes from */
     int32_t line;     /* of the list that it stands in; 0: none */
     bool found;       /* in a folder: it was not named, so what is no terrain is passed over */
+    bool passed;      /* and it was */
 } import_path;
 typedef struct import_paths {
     const char *const *argument;

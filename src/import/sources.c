@@ -37,7 +37,7 @@ static bool add(const import_job *job, import_paths *p, char *path, int argument
         p->room = room;
     }
     if (!path) return import_no_memory(job, "listing the sources");
-    p->path[p->count++] = (import_path){path, argument, line, found};
+    p->path[p->count++] = (import_path){.path = path, .argument = argument, .line = line, .found = found};
     return true;
 }
 

@@ -45,7 +45,6 @@ typedef struct record {
 } record;
 
 struct import_spool {
-    import_job job; /* for sentences; its message is whoever's who calls */
     char *path;
     int file;
     bool ours; /* locked, and a resume file or new */
@@ -195,6 +194,7 @@ static bool take_up(const import_job *job, import_spool *s, const import_spool_k
         else if (read_all(s->file, sizeof h, old, size) && h.checksum == checksum_of_header(&h, old))
             usable = usable_strips(s, keys, old, &h, &why);
     }
+    const bool alike = usable >= 0 && !memcmp(old, keys, size);
     free(old);
     if (usable >= 0) find_records(s, end);
     if (usable >= 0 && usable < s->strips) {
@@ -207,8 +207,9 @@ static bool take_up(const import_job *job, import_spool *s, const import_spool_k
         return begin_anew(job, s, keys);
     }
     s->found = s->strips;
-    /* Of sources behind the last strip others may be meant now. */
-    if (!write_all(s->file, 0, &s->header, sizeof s->header) || !write_all(s->file, sizeof h, keys, size) ||
+    /* Sources behind the last strip may have changed. */
+    if ((!alike &&
+         (!write_all(s->file, 0, &s->header, sizeof s->header) || !write_all(s->file, sizeof h, keys, size))) ||
         !cut(s, s->strips))
         return refuse(job, s->path, "cannot be written");
     return true;
@@ -233,7 +234,6 @@ bool import_spool_open(const import_job *job, const char *path, const import_spo
     import_spool *s = *spool = calloc(1, sizeof *s);
     if (!s) return import_no_memory(job, "opening the resume file");
     s->file = -1;
-    s->job = *job;
     s->header = (header){.magic = MAGIC,
                          .version = VERSION,
                          .kind = (uint32_t)grid->kind,
@@ -261,10 +261,6 @@ int32_t import_spool_strips(const import_spool *s) {
 
 int32_t import_spool_found(const import_spool *s) {
     return s->found;
-}
-
-const char *import_spool_name(const import_spool *s) {
-    return s->path;
 }
 
 uint64_t import_spool_bytes(const import_spool *s) {
