@@ -15,11 +15,11 @@ static void thousands_of_tiles_need_few_descriptors(void **unused) {
     struct rlimit before, few;
     getrlimit(RLIMIT_NOFILE, &before);
     few = before;
-    few.rlim_cur = 64;
+    few.rlim_cur = 48; /* fewer than tiles in a row */
     setrlimit(RLIMIT_NOFILE, &few);
     import_options o = defaults();
     const char *source = file("many");
-    const import_force wide = {.two_readings = true, .stage = -1, .kept = -1};
+    const import_force wide = {.two_readings = true, .strip_rows = 100, .stage = -1, .kept = -1};
     forced_fine(&source, 1, file("a.gpkg"), &o, &wide);
     setrlimit(RLIMIT_NOFILE, &before);
     assert_int_equal(national.sources, 2500);
@@ -303,6 +303,20 @@ static void gaps_overlaps_and_conflicts_are_those_of_every_sample(void **unused)
     }
 }
 
+/* A bay of two rectangles: the northern one does not reach the edge, and is not inside all the same. */
+static void a_hole_that_opens_to_the_edge_is_not_inside(void **unused) {
+    (void)unused;
+    static const int parts[][4] = {{0, 0, 20, 5}, {0, 0, 5, 20}, {15, 0, 5, 20}, {5, 15, 4, 5}};
+    for (size_t i = 0; i < LENGTH(parts); i++) add_tile("", parts[i][0], parts[i][1], parts[i][2], parts[i][3]);
+    write_tiles();
+    import_options o = defaults();
+    const char *faults = file("faults.geojson");
+    o.report = faults;
+    forced_fine(paths, count, file("a.gpkg"), &o, NULL);
+    expect_findings(faults, 0, 0, 20, 20);
+    says(notices, "no source covers 130 samples at the edge of the terrain (2 rectangles)");
+}
+
 static void the_worst_are_told_in_sentences(void **unused) {
     (void)unused;
     import_options o = defaults();
@@ -353,6 +367,7 @@ int main(void) {
         TEST(F44_the_order_of_sources_changes_no_byte),
         TEST(folders_and_lists_give_their_rasters),
         TEST(gaps_overlaps_and_conflicts_are_those_of_every_sample),
+        TEST(a_hole_that_opens_to_the_edge_is_not_inside),
         TEST(the_worst_are_told_in_sentences),
     };
     alarm(600); /* threads that wait for each other for ever are a failure too */

@@ -8,7 +8,7 @@ MUTANTS = [
      "test_import_national", "gaps_overlaps_and_conflicts_are_those_of_every_sample"),
     ("national: a hole at the edge is inside", "src/import/cover.c",
      "gap[first].inside = gap[first].inside && gap[second].inside;", "",
-     "test_import_national", "gaps_overlaps_and_conflicts_are_those_of_every_sample"),
+     "test_import_national", "a_hole_that_opens_to_the_edge_is_not_inside"),
     ("national: the last place of a conflict", "src/import/conflict.c",
      "(from->largest == into->largest && is_before(from->row, from->column, into->row, into->column))",
      "from->largest == into->largest",
