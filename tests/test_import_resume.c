@@ -10,6 +10,7 @@
 #include <sys/wait.h>
 
 #include "spool.h"
+#include <zstd.h>
 
 /* -------------------------------------------------------------------------------------------------- resuming -- */
 typedef struct killer {
@@ -333,6 +334,45 @@ static void F42_packed_strips_of_any_bytes_are_refused(void **unused) {
     }
 }
 
+/* Frames that are sound, of strips that lie: more planes than a value has bytes, voids or values that are not
+ * there, bytes that belong to nothing, an infinite height. */
+static void F42_a_strip_that_lies_about_itself_is_refused(void **unused) {
+    (void)unused;
+    const import_options o = defaults();
+    const import_job job = {&o, "x", message, sizeof message};
+    enum { WIDTH = 10, ROWS = 4, N = WIDTH * ROWS };
+    static const struct {
+        uint8_t planes, voids;
+        size_t bytes; /* behind the first eight */
+        bool fine;
+    } cases[] = {{2, 0, 2 * N, true},
+                 {2, 1, 3 * N, true},
+                 {0, 0, 0, true},
+                 {5, 0, 5 * N, false},
+                 {200, 0, 4 * N, false},
+                 {1, 1, N, false},
+                 {2, 0, 2 * N - 1, false},
+                 {0, 0, 5, false},
+                 {4, 0, 4 * N, false /* 0x7F.. twice makes an infinity */}};
+    spool_codec *codec;
+    assert_true(spool_codec_create(&job, IMPORT_F32, WIDTH, ROWS, &codec));
+    for (size_t i = 0; i < LENGTH(cases); i++) {
+        uint8_t plain[8 + 5 * N] = {cases[i].planes, cases[i].voids}, valid[N];
+        float values[N];
+        import_strip strip = {IMPORT_F32, WIDTH, 0, ROWS, values, valid};
+        if (i + 1 == LENGTH(cases)) { /* the first value is 0xFF000000 / 2 = 0x7F800000, zigzag of an even number */
+            plain[8 + 3 * N] = 0xFF;
+        }
+        const size_t size = 8 + cases[i].bytes;
+        uint8_t packed[1000];
+        const size_t n = ZSTD_compress(packed, sizeof packed, plain, size, 1);
+        assert_false(ZSTD_isError(n));
+        memcpy(spool_packed_room(codec, n), packed, n);
+        if (spool_decode(codec, n, size, &strip, NULL, 0) != cases[i].fine) fail_msg("case %zu", i);
+    }
+    spool_codec_free(codec);
+}
+
 static void two_imports_do_not_share_a_resume_file(void **unused) {
     (void)unused;
     import_options o = defaults();
@@ -441,6 +481,7 @@ int main(void) {
         TEST(conflicts_of_the_first_part_are_not_lost),
         TEST(F42_a_damaged_resume_file_changes_no_byte),
         TEST(F42_packed_strips_of_any_bytes_are_refused),
+        TEST(F42_a_strip_that_lies_about_itself_is_refused),
         TEST(two_imports_do_not_share_a_resume_file),
         TEST(F50_a_full_disk_stops_the_resume_file_with_a_sentence),
         TEST(a_vrt_of_tiles_is_one_source),
