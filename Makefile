@@ -73,10 +73,10 @@ $(BUILD)/%.o: src/%.c
 $(BUILD)/core/error_kernels.o: WARNINGS += -Wno-psabi
 
 # The SQL that a person can read is the SQL that the program runs.
-$(BUILD)/generated/schema_sql.h: sql/schema.sql sql/terrain.sql sql/geopackage.sql
+$(BUILD)/generated/schema_sql.h: sql/schema.sql sql/terrain.sql sql/fill.sql sql/geopackage.sql
 	@mkdir -p $(@D)
-	@for f in schema terrain geopackage; do \
-	  printf 'static const char sql_%s[] =\n' $$f; \
+	@for f in schema terrain fill geopackage; do \
+	  printf '__attribute__((unused)) static const char sql_%s[] =\n' $$f; \
 	  sed -e '/^--/d' -e 's/\\/\\\\/g' -e 's/"/\\"/g' -e 's/^/    "/' -e 's/$$/\\n"/' sql/$$f.sql; printf '    ;\n'; \
 	done > $@
 

@@ -102,6 +102,10 @@ int store_take_pyramid(store *s, const store_terrain *t, rqt_metric metric, rqt_
 /* What rqt_check finds of the minimal errors of a terrain, as store_check. minimal.c */
 int store_check_minimal(store *s, const store_terrain *t, bool (*tell)(void *context, const store_finding *finding),
                         void *context, char **error);
+/* Does it have the table of what was filled? The same check of that. fill.c */
+bool store_has_fill(sqlite3 *db, const store_terrain *t);
+int store_check_fill(store *s, const store_terrain *t, bool (*tell)(void *context, const store_finding *finding),
+                     void *context, char **error);
 /* The terrain as the tables of its minimal errors have it; NULL when it has none. minimal.c */
 const store_terrain *store_minimal(store *s, const store_terrain *t);
 

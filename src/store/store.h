@@ -137,6 +137,9 @@ typedef struct store_finding {
 int store_check(store *s, const store_terrain *t, bool (*tell)(void *context, const store_finding *finding),
                 void *context, char **error);
 
+/* How many samples of the terrain were no data: [0] STORE_FILLED, [1] STORE_SEA. */
+int store_fill_counts(store *s, const store_terrain *t, int64_t counts[2], char **error);
+
 /* ---------------------------------------------------------------------------------------------- writing */
 /* Create what a new, empty database needs: a GeoPackage (application id, core tables). Harmless on one that is a
  * GeoPackage already; leaves every other database as it is. Inside the caller's transaction. */
@@ -150,6 +153,10 @@ int store_writer_begin(sqlite3 *db, const store_terrain *info, bool replace, sto
 /* One block, in ascending order of number. */
 int store_writer_block(store_writer *w, rqt_block_number number, const rqt_summary *summary, const uint8_t *bytes,
                        size_t size, char **error);
+/* Samples first .. last of a row, which were no data: STORE_FILLED between neighbours, STORE_SEA. Runs come in the
+ * order of rows, and of columns in them. */
+enum { STORE_FILLED = 1, STORE_SEA = 2 };
+int store_writer_fill(store_writer *w, int32_t row, int32_t first, int32_t last, int kind, char **error);
 /* Mark the terrain complete. */
 int store_writer_finish(store_writer *w, rqt_code max_error, char **error);
 /* Release, finished or not. */
