@@ -16,7 +16,7 @@
  * is not known whether the triangle is mixed, so is every cell that may tell.
  *
  * The extremes of all heights are found alike, with "height" for "deviation". In a raster of one column or row, which
- * has no triangles, nothing bounds a height: all of it is looked at.
+ * has no triangles, and in one of 2 x 2, where nothing is split, nothing bounds a height: all of it is looked at.
  */
 #include "update.h"
 
@@ -307,7 +307,7 @@ typedef struct extreme {
 /* No height in the cell has more than this, times sign; INT64_MIN where there are none. */
 static int64_t extreme_bound(const update *u, const extreme *e, const cell *c) {
     const bool all = c->valid[0] && c->valid[1] && c->valid[2] && c->valid[3];
-    if (u->lattice.width == 1 || u->lattice.height == 1) return MUST;
+    if (u->lattice.width == 1 || u->lattice.height == 1 || u->k == 0) return MUST;
     if (!c->outline && !all) return INT64_MIN;
     if (!all) return MUST;
     int64_t most = INT64_MIN;
