@@ -1,10 +1,11 @@
 /* test_core_update.c - an update of a part is a build of the whole: every block and every summary, byte for byte.
  *
- * The oracle is the plain way: errors of the changed raster in memory, saturated, cut into blocks by rqt_pyramid. The
- * update sees encoded blocks and summaries alone, as a database has them. */
+ * The oracle is the plain way: errors of the changed raster in memory, saturated, cut into blocks by rqt_pyramid.
+ * The update sees encoded blocks and summaries alone, as a database has them. */
 #include "test_core_support.h"
 
-/* ------------------------------------------------------------------------------------------- a table of blocks -- */
+/* ------------------------------------------------------------------------------------------- a table of blocks --
+ */
 typedef struct row {
     rqt_block_number number;
     uint8_t summary[RQT_SUMMARY_BYTES];
@@ -82,7 +83,8 @@ static table table_build(const raster *r, int k) {
         rqt_summary summary;
         rqt_pyramid_block(pyramid, n, &t.rows[n].number, &summary, &t.block);
         rqt_summary_encode(&summary, t.rows[n].summary);
-        assert_int_equal(rqt_block_encode(t.codec, &t.block, quantum_of(&t.unit), t.buffer, &t.rows[n].size), RQT_OK);
+        assert_int_equal(rqt_block_encode(t.codec, &t.block, quantum_of(&t.unit), t.buffer, &t.rows[n].size),
+                         RQT_OK);
         t.rows[n].bytes = malloc(t.rows[n].size);
         assert_non_null(t.rows[n].bytes);
         memcpy(t.rows[n].bytes, t.buffer, t.rows[n].size);
@@ -227,12 +229,14 @@ static void check_equals_build(const table *t, const raster *r, const char *what
         (void)rqt_block_locate(&t->lattice, t->k, a->number, &place);
         raster_print(r);
         for (int i = 0; i < RQT_SUMMARY_BYTES && !same_summary; i++)
-            if (a->summary[i] != b->summary[i]) print_error("byte %d of the summary: %d, built %d\n", i, a->summary[i], b->summary[i]);
+            if (a->summary[i] != b->summary[i])
+                print_error("byte %d of the summary: %d, built %d\n", i, a->summary[i], b->summary[i]);
         if (same_summary) tell_difference(t, a, b);
-        fail_msg("%s, %s %d x %d, k = %d: after new samples at (%d,%d) %d x %d block %llu (level %d, (%d,%d)) has %s", what,
-                 r->name, r->width, r->height, t->k, p->x, p->y, p->width, p->height,
-                 (unsigned long long)a->number, place.level, place.i, place.j,
-                 same_summary ? "other bytes than a build gives" : "another summary than a build gives");
+        fail_msg(
+            "%s, %s %d x %d, k = %d: after new samples at (%d,%d) %d x %d block %llu (level %d, (%d,%d)) has %s",
+            what, r->name, r->width, r->height, t->k, p->x, p->y, p->width, p->height,
+            (unsigned long long)a->number, place.level, place.i, place.j,
+            same_summary ? "other bytes than a build gives" : "another summary than a build gives");
     }
     const rqt_statistics *a = &t->statistics, *b = &fresh.statistics;
     CHECK(a->voids == b->voids && a->min_q == b->min_q && a->max_q == b->max_q && a->max_error == b->max_error,
@@ -292,7 +296,8 @@ static patch random_patch(const raster *r) {
         }
     }
     patch p = patch_make(r, x0, y0, width, height);
-    const int kind = random_between(0, 4), parameter[4] = {random_between(-99, 99), random_between(-99, 99), 500, 3};
+    const int kind = random_between(0, 4),
+              parameter[4] = {random_between(-99, 99), random_between(-99, 99), 500, 3};
     const surface s = (surface)random_between(0, SURFACE_COUNT - 1);
     for (int n = 0; n < width * height; n++) {
         const bool here = kind != 0 || random_between(0, width * height - 1) == 0 || n == 0;
@@ -315,7 +320,8 @@ static raster random_raster(int most) {
     return r;
 }
 
-/* -------------------------------------------------------------------------------------------------------- tests -- */
+/* -------------------------------------------------------------------------------------------------------- tests --
+ */
 
 static void F23_an_update_equals_a_build_in_every_block_and_summary(void **state) {
     (void)state;

@@ -1,15 +1,15 @@
 /* update.c - new samples for a part of a terrain: whose error changes, and to what.
  *
- * Errors are settled by scales, fine to coarse, sides before centres, as saturation goes, but only where something can
- * have changed: at vertices whose diamond holds a sample that differs, or one of whose children has changed. All of
- * these lie within three times 2^scale of the rectangle, so each scale has a small window of its own, and above the
- * rectangle's size a window has some fifty vertices, whatever the terrain.
+ * Errors are settled by scales, fine to coarse, sides before centres, as saturation goes, but only where something
+ * can have changed: at vertices whose diamond holds a sample that differs, or one of whose children has changed.
+ * All of these lie within three times 2^scale of the rectangle, so each scale has a small window of its own, and
+ * above the rectangle's size a window has some fifty vertices, whatever the terrain.
  *
- * Stored is e_sat, not e. Where the diamond is as it was, e need not be known: with c the maximum over the children now
- * and c' what it was, e_sat is c if c >= the old e_sat, and stays if c' was less than it (for then it was e). Else, and
- * where samples differ, both triangles are measured: small ones by their samples, with the same code as an import's,
- * those larger than a block of stride 1 by a search (update_search.c). A measurement is the exact maximum, rounded up
- * once, so every code equals an import's.
+ * Stored is e_sat, not e. Where the diamond is as it was, e need not be known: with c the maximum over the children
+ * now and c' what it was, e_sat is c if c >= the old e_sat, and stays if c' was less than it (for then it was e).
+ * Else, and where samples differ, both triangles are measured: small ones by their samples, with the same code as
+ * an import's, those larger than a block of stride 1 by a search (update_search.c). A measurement is the exact
+ * maximum, rounded up once, so every code equals an import's.
  *
  * Vertices whose diamonds have no area, past the raster, count as 0 here although descendants of theirs may err:
  * whoever depends on them has the same descendants on the near side, where the lattice is its own mirror image.
@@ -48,7 +48,8 @@ typedef struct difference {
 
 static void note(difference *d, int32_t x, int32_t y, uint8_t old_valid, int32_t old_q, uint8_t valid, int32_t q) {
     if (d->count++ == 0) d->box = (sample_window){x, y, x, y};
-    d->box = (sample_window){smaller(d->box.x0, x), smaller(d->box.y0, y), larger(d->box.x1, x), larger(d->box.y1, y)};
+    d->box =
+        (sample_window){smaller(d->box.x0, x), smaller(d->box.y0, y), larger(d->box.x1, x), larger(d->box.y1, y)};
     d->more_voids += (valid ? 0 : 1) - (old_valid ? 0 : 1);
     if (old_valid) {
         d->old_low = d->had ? smaller(d->old_low, old_q) : old_q;
@@ -128,7 +129,8 @@ static bool diamond_touches(const update *u, rqt_vertex v, int scale) {
     const bool side = ((v.x ^ v.y) >> scale) & 1;
     /* Clamped, a diamond is no longer one. */
     if (!side || v.x + q >= u->lattice.width || v.y + q >= u->lattice.height) return true;
-    const int32_t dx = larger(larger(a->x0 - v.x, v.x - a->x1), 0), dy = larger(larger(a->y0 - v.y, v.y - a->y1), 0);
+    const int32_t dx = larger(larger(a->x0 - v.x, v.x - a->x1), 0),
+                  dy = larger(larger(a->y0 - v.y, v.y - a->y1), 0);
     return dx + dy <= q;
 }
 
@@ -246,7 +248,8 @@ static bool settle_level(update *u, int scale) {
                 const rqt_vertex v = {i << scale, j << scale};
                 if (kind ? !(i & j & 1) : !((i ^ j) & 1)) continue;
                 if (!lattice_has_area(&u->lattice, v)) continue;
-                if (!settle(u, v, scale, &l->vertex[(size_t)(j - l->j0) * (size_t)l->columns + (size_t)(i - l->i0)]))
+                if (!settle(u, v, scale,
+                            &l->vertex[(size_t)(j - l->j0) * (size_t)l->columns + (size_t)(i - l->i0)]))
                     return false;
             }
         }
@@ -322,8 +325,8 @@ rqt_status rqt_update_run(const rqt_update *given, const rqt_allocator *allocato
     memset(result, 0, sizeof *result);
     const rqt_lattice *l = &given->lattice;
     if (!rqt_unit_is_valid(&given->unit) || !(given->cost.cell > 0) || !(given->cost.c > 0) || given->k < 0 ||
-        given->k > RQT_MAX_BLOCK_K || given->k > l->K || (given->k == 0 && l->K > 0) || given->x < 0 || given->y < 0 ||
-        given->width < 1 || given->height < 1 || given->width > l->width - given->x ||
+        given->k > RQT_MAX_BLOCK_K || given->k > l->K || (given->k == 0 && l->K > 0) || given->x < 0 ||
+        given->y < 0 || given->width < 1 || given->height < 1 || given->width > l->width - given->x ||
         given->height > l->height - given->y)
         return RQT_INVALID;
     update *u = memory_take(allocator, sizeof *u);

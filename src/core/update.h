@@ -12,8 +12,8 @@ typedef struct updated_vertex {
     uint8_t changed; /* else nothing else is filled in */
 } updated_vertex;
 
-/* The vertices of one scale that a change of the rectangle can reach, and those of coarser scales between them, which
- * are not used: places i0 + u, j0 + v, in steps of 2^scale. */
+/* The vertices of one scale that a change of the rectangle can reach, and those of coarser scales between them,
+ * which are not used: places i0 + u, j0 + v, in steps of 2^scale. */
 typedef struct update_level {
     int32_t i0, j0, columns, rows;
     updated_vertex *vertex;
@@ -24,15 +24,15 @@ typedef struct update_item update_item;
 struct update_item {
     rqt_block_number number;
     rqt_block_place place;
-    update_item *next;     /* of the same level */
-    rqt_block block;       /* q NULL: not there. Of stride 1: new samples, old errors until it is made anew */
-    uint8_t *valid;        /* the mask of a block of stride 1; NULL: no voids */
-    bool remake;           /* its bytes may change */
-    bool differs;          /* they do */
-    bool summarize;        /* its summary may change */
-    bool has_before;       /* the summary has been read */
+    update_item *next; /* of the same level */
+    rqt_block block;   /* q NULL: not there. Of stride 1: new samples, old errors until it is made anew */
+    uint8_t *valid;    /* the mask of a block of stride 1; NULL: no voids */
+    bool remake;       /* its bytes may change */
+    bool differs;      /* they do */
+    bool summarize;    /* its summary may change */
+    bool has_before;   /* the summary has been read */
     rqt_summary before;
-    rqt_code em;           /* new, where remade */
+    rqt_code em; /* new, where remade */
     bool outline;
 };
 
@@ -46,18 +46,18 @@ typedef struct update {
     const rqt_update *given;
     const rqt_allocator *allocator;
     rqt_lattice lattice;
-    int k, levels;            /* levels of blocks */
-    rqt_status status;        /* of the first thing that failed */
-    bool has_voids;           /* before or after */
-    sample_window area;       /* the samples that differ lie in here */
-    deviation_field field;    /* without samples */
+    int k, levels;         /* levels of blocks */
+    rqt_status status;     /* of the first thing that failed */
+    bool has_voids;        /* before or after */
+    sample_window area;    /* the samples that differ lie in here */
+    deviation_field field; /* without samples */
     update_level level[RQT_MAX_K + 1];
     update_item *items[RQT_MAX_K + 1]; /* by level of blocks */
-    update_item **table;      /* open addressing by number */
+    update_item **table;               /* open addressing by number */
     size_t slots, count;
-    update_item *last;        /* found */
-    uint8_t *mask;            /* of a block that is no item */
-    uint8_t *known;           /* scratch of a block's size */
+    update_item *last; /* found */
+    uint8_t *mask;     /* of a block that is no item */
+    uint8_t *known;    /* scratch of a block's size */
     update_cell_key *heap;
     size_t heap_count, heap_capacity;
     rqt_update_result *result;

@@ -2,9 +2,9 @@
  *
  * Bytes, fine to coarse. A block of stride 1 that holds a changed sample or vertex is made anew: new samples, new
  * errors. A coarser one is put together from its four quarters, as they are now: what it keeps errs more than its
- * floor, hence more than theirs, and is kept there too, but for the vertices at the quarters' corners, whose errors are
- * known otherwise. Where a block comes out as it was, what is above it does not hear of it. A vertex of scale s is
- * lattice to a block of side 2^(s+1) for the first time: before, it is a corner, and in no bytes.
+ * floor, hence more than theirs, and is kept there too, but for the vertices at the quarters' corners, whose errors
+ * are known otherwise. Where a block comes out as it was, what is above it does not hear of it. A vertex of scale s
+ * is lattice to a block of side 2^(s+1) for the first time: before, it is a corner, and in no bytes.
  *
  * Summaries, coarse to fine. What a summary says, its parent's also says, or its own block: so a summary can only
  * change where a vertex at a corner changed, its block was made anew, or its parent's summary changed.
@@ -144,7 +144,8 @@ static bool know_before(update *u, update_item *item) {
     return update_summary(u, item->place.level, item->place.i, item->place.j, &item->before);
 }
 
-/* ------------------------------------------------------------------------------------------- what is concerned -- */
+/* ------------------------------------------------------------------------------------------- what is concerned --
+ */
 
 /* Mark the blocks of a level whose closed cells hold a vertex of scale `scale`. */
 static bool mark_around(update *u, rqt_vertex v, int level, bool remake) {
@@ -213,7 +214,8 @@ static bool mark_samples(update *u) {
     return true;
 }
 
-/* ------------------------------------------------------------------------------------------ what is in summaries -- */
+/* ------------------------------------------------------------------------------------------ what is in summaries
+ * -- */
 
 static void amend_vertex(const update *u, rqt_vertex v, int32_t *q, rqt_code *error, uint8_t *flags) {
     const rqt_vertex s = rqt_vertex_clamp(&u->lattice, v);
@@ -243,13 +245,14 @@ static rqt_summary amended(const update *u, const update_item *item) {
     for (int n = 0; n < 2; n++) {
         const bool east = (p->i & 1) != (n == 0), south = (p->j & 1) != (n == 1);
         rqt_summary_vertex *f = &s.far[n];
-        amend_vertex(u, (rqt_vertex){px + (east ? 2 * p->side : 0), py + (south ? 2 * p->side : 0)}, &f->q, &f->error,
-                     &f->flags);
+        amend_vertex(u, (rqt_vertex){px + (east ? 2 * p->side : 0), py + (south ? 2 * p->side : 0)}, &f->q,
+                     &f->error, &f->flags);
     }
     return s;
 }
 
-/* ------------------------------------------------------------------------------------------------------- bytes -- */
+/* ------------------------------------------------------------------------------------------------------- bytes --
+ */
 
 static bool is_corner(size_t at, size_t n) {
     return at == 0 || at == n - 1 || at == n * (n - 1) || at == n * n - 1;
@@ -282,7 +285,8 @@ static void settle_past(const update *u, update_item *item) {
     for (int32_t v = 0; v < n; v++)
         for (int32_t c = 0; c < n; c++) {
             const size_t at = (size_t)v * (size_t)n + (size_t)c;
-            const rqt_vertex here = {item->place.x + c * item->place.stride, item->place.y + v * item->place.stride};
+            const rqt_vertex here = {item->place.x + c * item->place.stride,
+                                     item->place.y + v * item->place.stride};
             if (lattice_has_area(&u->lattice, here)) continue;
             b->error[at] = 0;
             b->flags[at] &= RQT_VALID;
@@ -406,7 +410,8 @@ static void put_corner_errors(const update *u, update_item *item) {
     const int32_t half = 1 << u->k >> 1, n = (int32_t)side_of(u);
     for (int32_t v = 0; v < n; v += half)
         for (int32_t c = 0; c < n; c += half) {
-            const rqt_vertex here = {item->place.x + c * item->place.stride, item->place.y + v * item->place.stride};
+            const rqt_vertex here = {item->place.x + c * item->place.stride,
+                                     item->place.y + v * item->place.stride};
             const updated_vertex *now = update_find(u, here);
             const size_t at = (size_t)v * (size_t)n + (size_t)c;
             if (!now) continue;
@@ -447,7 +452,8 @@ static bool remake_all(update *u) {
     for (int level = u->levels - 1; level >= 0; level--)
         for (update_item *item = u->items[level]; item; item = item->next) {
             if (!item->remake) continue;
-            if (!(item->place.stride == 1 ? know_before(u, item) && remake_finest(u, item) : remake_coarse(u, item)))
+            if (!(item->place.stride == 1 ? know_before(u, item) && remake_finest(u, item)
+                                          : remake_coarse(u, item)))
                 return false;
             const bool outline = item->before.exact.em == RQT_CODE_INFINITY;
             if (level == 0 || (!item->differs && item->outline == outline)) continue;
@@ -465,11 +471,13 @@ static void settle_max_error(update *u) {
     if (!root || !root->remake) return;
     rqt_code most = root->em;
     for (size_t at = 0; at < n * n; at++)
-        if (root->block.error[at] > most && root->block.error[at] != RQT_CODE_INFINITY) most = root->block.error[at];
+        if (root->block.error[at] > most && root->block.error[at] != RQT_CODE_INFINITY)
+            most = root->block.error[at];
     u->result->after.max_error = most;
 }
 
-/* --------------------------------------------------------------------------------------------------- summaries -- */
+/* --------------------------------------------------------------------------------------------------- summaries --
+ */
 
 static rqt_code exact_em(const update_item *item) {
     return item->outline ? RQT_CODE_INFINITY : item->em;

@@ -1,22 +1,24 @@
 /* update_search.c - the largest deviation of a triangle, without looking at all of its samples.
  *
  * A triangle within a block of stride 1 is measured by its samples. For a larger one the blocks are a quadtree of
- * cells, and the summary of a block bounds its whole cell: both halves of it have the centre for their split vertex,
- * so every valid sample lies within e_sat(centre) of the half's plane, and between that plane and any other one the
- * largest distance is at a corner:
+ * cells, and the summary of a block bounds its whole cell: both halves of it have the centre for their split
+ * vertex, so every valid sample lies within e_sat(centre) of the half's plane, and between that plane and any other
+ * one the largest distance is at a corner:
  *
  *     |z - plane of T|  <=  e_sat(centre) + max over the cell's corners of |z - plane of T|
  *
- * This holds for cells that reach over the raster's edge as well: clamped halves tile the clamped cell. The cells that
- * promise most are divided first, until none promises more than what has been found; cells of stride 1 are measured by
- * their samples. All in codes, which rounding up keeps in order: the result is the code of the exact maximum.
+ * This holds for cells that reach over the raster's edge as well: clamped halves tile the clamped cell. The cells
+ * that promise most are divided first, until none promises more than what has been found; cells of stride 1 are
+ * measured by their samples. All in codes, which rounding up keeps in order: the result is the code of the exact
+ * maximum.
  *
- * Voids. Where the centre has no outline bit, nothing in the cell is mixed, and a corner tells what all samples are.
- * Where it has one, a half with a void corner has no plane that would bound it: its cell is divided. And as long as it
- * is not known whether the triangle is mixed, so is every cell that may tell.
+ * Voids. Where the centre has no outline bit, nothing in the cell is mixed, and a corner tells what all samples
+ * are. Where it has one, a half with a void corner has no plane that would bound it: its cell is divided. And as
+ * long as it is not known whether the triangle is mixed, so is every cell that may tell.
  *
- * The extremes of all heights are found alike, with "height" for "deviation". In a raster of one column or row, which
- * has no triangles, and in one of 2 x 2, where nothing is split, nothing bounds a height: all of it is looked at.
+ * The extremes of all heights are found alike, with "height" for "deviation". In a raster of one column or row,
+ * which has no triangles, and in one of 2 x 2, where nothing is split, nothing bounds a height: all of it is looked
+ * at.
  */
 #include "update.h"
 
@@ -31,7 +33,8 @@ static bool push(update *u, update_cell_key key) {
     if (!memory_grow(u->allocator, (void **)&u->heap, &u->heap_capacity, u->heap_count + 1, sizeof *u->heap))
         return update_fail(u, RQT_NO_MEMORY);
     size_t at = u->heap_count++;
-    for (; at > 0 && u->heap[(at - 1) / 2].bound < key.bound; at = (at - 1) / 2) u->heap[at] = u->heap[(at - 1) / 2];
+    for (; at > 0 && u->heap[(at - 1) / 2].bound < key.bound; at = (at - 1) / 2)
+        u->heap[at] = u->heap[(at - 1) / 2];
     u->heap[at] = key;
     return true;
 }
@@ -48,7 +51,8 @@ static update_cell_key pop(update *u) {
     return first;
 }
 
-/* ------------------------------------------------------------------------------------- cells and their samples -- */
+/* ------------------------------------------------------------------------------------- cells and their samples --
+ */
 
 /* A block's cell as it is now. */
 typedef struct cell {
@@ -102,8 +106,7 @@ static bool samples_of_block(update *u, int32_t i, int32_t j, bool near, deviati
         field->valid = item->valid;
         return true;
     }
-    const rqt_block *block =
-        u->given->read_block(u->given->context, rqt_block_number_of(u->levels - 1, i, j));
+    const rqt_block *block = u->given->read_block(u->given->context, rqt_block_number_of(u->levels - 1, i, j));
     if (!block) return update_fail(u, RQT_READ_FAILED);
     field->q = block->q;
     if (u->has_voids) {
@@ -117,7 +120,8 @@ static bool is_leaf(const update *u, int level) {
     return level == u->levels - 1;
 }
 
-/* ----------------------------------------------------------------------------------------------- one triangle -- */
+/* ----------------------------------------------------------------------------------------------- one triangle --
+ */
 
 typedef struct question {
     plane_triangle p;
@@ -147,7 +151,8 @@ static bool holds(const sample_triangle *t, rqt_vertex v) {
     return beside_edge(t, 0, v) >= 0 && beside_edge(t, 1, v) >= 0 && beside_edge(t, 2, v) >= 0;
 }
 
-/* Do the interiors of triangle and cell meet? Two convex shapes do not where a side of one of them is between them. */
+/* Do the interiors of triangle and cell meet? Two convex shapes do not where a side of one of them is between them.
+ */
 static bool meets(const sample_triangle *t, const cell *c) {
     int32_t x0 = INT32_MAX, x1 = INT32_MIN, y0 = INT32_MAX, y1 = INT32_MIN;
     for (int n = 0; n < 3; n++) {
@@ -272,7 +277,8 @@ static bool ask(update *u, const rqt_triangle *t, int level, int32_t i, int32_t 
 }
 
 bool update_measure(update *u, const rqt_triangle *t, int scale, rqt_code *code, bool *mixed) {
-    const int32_t x = t->left.x < t->right.x ? t->left.x : t->right.x, y = t->left.y < t->right.y ? t->left.y : t->right.y;
+    const int32_t x = t->left.x < t->right.x ? t->left.x : t->right.x,
+                  y = t->left.y < t->right.y ? t->left.y : t->right.y;
     const int32_t west = x < t->apex.x ? x : t->apex.x, north = y < t->apex.y ? y : t->apex.y;
     if (scale < u->k) {
         deviation_field field;
@@ -296,7 +302,8 @@ bool update_measure(update *u, const rqt_triangle *t, int scale, rqt_code *code,
     return true;
 }
 
-/* ------------------------------------------------------------------------------------------- extremes of heights -- */
+/* ------------------------------------------------------------------------------------------- extremes of heights
+ * -- */
 
 typedef struct extreme {
     int sign;

@@ -98,6 +98,18 @@ bool store_is_interrupted(store *s, int *code);
 #define STORE_MINIMAL "_minimal" /* suffix of the tables that hold minimal errors */
 /* A writer of those tables, beside a terrain of main that is complete. writer.c */
 int store_writer_beside(sqlite3 *db, const store_terrain *t, store_writer **writer, char **error);
+/* A writer of changes to a terrain of main. writer.c */
+int store_writer_over(sqlite3 *db, const store_terrain *t, store_writer **writer, char **error);
+/* Another summary, and other bytes unless NULL, for a block that is there; its row in the index likewise. */
+int store_writer_change(store_writer *w, rqt_block_number number, const rqt_summary *before,
+                        const rqt_summary *after, const uint8_t *bytes, size_t size, char **error);
+/* The terrain's row, when all changes are made. */
+int store_writer_amend(store_writer *w, const rqt_statistics *statistics, const char *source, char **error);
+int store_drop_minimal(sqlite3 *db, int64_t id, char **error);
+/* |f|/d: metres of a height quantum. terrain.c */
+double store_quantum(const store_terrain *t);
+/* Forget what is kept of a block that has changed. blocks.c */
+void store_forget_block(store *s, const store_terrain *t, rqt_block_number number);
 /* The pyramid over a metric's errors, computed now if need be; valid until the store forgets. methods.c */
 int store_take_pyramid(store *s, const store_terrain *t, rqt_metric metric, rqt_outline outline,
                        const rqt_pyramid **pyramid, char **error);
