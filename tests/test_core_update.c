@@ -117,7 +117,8 @@ static row *row_of(table *t, rqt_block_number number) {
 }
 
 static bool fails(table *t) {
-    return t->fail_read && ++t->reads == t->fail_read;
+    t->reads++;
+    return t->fail_read && t->reads == t->fail_read;
 }
 
 static const rqt_block *read_block(void *context, rqt_block_number number) {
@@ -326,7 +327,7 @@ static raster random_raster(int most) {
 static void F23_an_update_equals_a_build_in_every_block_and_summary(void **state) {
     (void)state;
     random_begin(__func__);
-    for (int round = 0; round < 500; round++) {
+    for (int round = 0; round < 250; round++) {
         raster r = random_raster(round % 10 ? 40 : 70);
         table t = table_build(&r, random_between(1, 5));
         for (int again = 0; again < 2; again++) {
@@ -342,10 +343,231 @@ static void F23_an_update_equals_a_build_in_every_block_and_summary(void **state
     }
 }
 
+/* Every extent has edges of its own, at which lattice and raster part. */
+static void F40_an_update_equals_a_build_for_every_small_extent(void **state) {
+    (void)state;
+    random_begin(__func__);
+    for (int height = 1; height <= 19; height++)
+        for (int width = 1; width <= 19; width += 1 + (height > 10)) {
+            raster r = raster_make((surface)random_between(0, SURFACE_COUNT - 1), width, height,
+                                   random_between(0, 1) ? -1 : 10);
+            table t = table_build(&r, random_between(1, 3));
+            patch p = random_patch(&r);
+            rqt_update_result result;
+            assert_int_equal(table_update(&t, &p, &result), RQT_OK);
+            exchange(&r, &p);
+            check_equals_build(&t, &r, "extent", &p);
+            patch_free(&p);
+            table_free(&t);
+            raster_free(&r);
+        }
+}
+
+static void check_same_rows(const table *a, const table *b, const char *what) {
+    assert_int_equal(a->count, b->count);
+    for (size_t n = 0; n < a->count; n++)
+        CHECK(!memcmp(a->rows[n].summary, b->rows[n].summary, RQT_SUMMARY_BYTES) &&
+                  a->rows[n].size == b->rows[n].size &&
+                  !memcmp(a->rows[n].bytes, b->rows[n].bytes, a->rows[n].size),
+              "%s: block %llu differs", what, (unsigned long long)a->rows[n].number);
+    assert_memory_equal(&a->statistics, &b->statistics, sizeof a->statistics);
+}
+
+static void F22_an_update_back_restores_every_byte(void **state) {
+    (void)state;
+    random_begin(__func__);
+    for (int round = 0; round < 120; round++) {
+        raster r = random_raster(60);
+        table t = table_build(&r, random_between(1, 5)), before = table_build(&r, t.k);
+        patch p = random_patch(&r);
+        rqt_update_result result;
+        assert_int_equal(table_update(&t, &p, &result), RQT_OK);
+        exchange(&r, &p);
+        assert_int_equal(table_update(&t, &p, &result), RQT_OK);
+        check_same_rows(&t, &before, "there and back");
+        /* Once more changes nothing, and writes nothing. */
+        assert_int_equal(table_update(&t, &p, &result), RQT_OK);
+        assert_int_equal(result.changed, 0);
+        assert_int_equal(t.blocks_written + t.summaries_written, 0);
+        patch_free(&p);
+        table_free(&t);
+        table_free(&before);
+        raster_free(&r);
+    }
+}
+
+static void F44_the_order_of_two_updates_apart_does_not_matter(void **state) {
+    (void)state;
+    random_begin(__func__);
+    for (int round = 0; round < 60; round++) {
+        raster r = random_raster(60);
+        if (r.width < 2) {
+            raster_free(&r);
+            continue;
+        }
+        const int at = random_between(1, r.width - 1);
+        table one = table_build(&r, random_between(1, 5)), other = table_build(&r, one.k);
+        patch west = patch_make(&r, 0, 0, at, r.height), east = patch_make(&r, at, 0, r.width - at, r.height);
+        for (int n = 0; n < west.width * west.height; n++) west.q[n] = random_between(-50, 50);
+        for (int n = 0; n < east.width * east.height; n++) east.q[n] = random_between(-500, 50);
+        rqt_update_result result;
+        assert_int_equal(table_update(&one, &west, &result), RQT_OK);
+        assert_int_equal(table_update(&one, &east, &result), RQT_OK);
+        assert_int_equal(table_update(&other, &east, &result), RQT_OK);
+        assert_int_equal(table_update(&other, &west, &result), RQT_OK);
+        check_same_rows(&one, &other, "order");
+        patch_free(&west);
+        patch_free(&east);
+        table_free(&one);
+        table_free(&other);
+        raster_free(&r);
+    }
+}
+
+/* A hill in the corner, of some thousand blocks: what is far away is not read. */
+static void an_update_reads_what_is_near_and_little_else(void **state) {
+    (void)state;
+    random_begin(__func__);
+    const int side = 513;
+    raster r = raster_from_memory(side, side, NULL, NULL, &UNIT_METRE, "hills");
+    for (int y = 0; y < side; y++)
+        for (int x = 0; x < side; x++)
+            r.q[y * side + x] = (int32_t)(takagi(x, y, 512) + takagi(x + 37, y + 11, 128) + random_between(0, 3));
+    table t = table_build(&r, 4);
+    patch p = patch_make(&r, 70, 90, 20, 20);
+    for (int n = 0; n < 400; n++) p.q[n] += 25;
+    rqt_update_result result;
+    assert_int_equal(table_update(&t, &p, &result), RQT_OK);
+    const size_t reads = t.reads;
+    CHECK(result.cells < (int64_t)t.count && t.blocks_written < t.count / 10 && reads < 2 * t.count,
+          "%lld summaries looked at, %zu rows read, %zu blocks written, of %zu", (long long)result.cells, reads,
+          t.blocks_written, t.count);
+    CHECK(result.measured < side * side, "%lld samples measured", (long long)result.measured);
+    exchange(&r, &p);
+    check_equals_build(&t, &r, "hills", &p);
+    patch_free(&p);
+    table_free(&t);
+    raster_free(&r);
+}
+
+/* On a plateau all that a triangle deviates is the same everywhere: bounds that are met must end the search. */
+static void a_plateau_is_not_searched_through(void **state) {
+    (void)state;
+    const int side = 513;
+    raster r = raster_from_memory(side, side, NULL, NULL, &UNIT_METRE, "plateau");
+    for (int y = 0; y < side; y++)
+        for (int x = 0; x < side; x++) r.q[y * side + x] = x % 64 == 0 && y % 64 == 0 ? 10 : 0;
+    table t = table_build(&r, 3);
+    patch p = patch_make(&r, 3, 3, 1, 1);
+    p.q[0] = 1;
+    rqt_update_result result;
+    assert_int_equal(table_update(&t, &p, &result), RQT_OK);
+    CHECK(result.cells < (int64_t)t.count, "%lld summaries of %zu looked at", (long long)result.cells, t.count);
+    exchange(&r, &p);
+    check_equals_build(&t, &r, "plateau", &p);
+    patch_free(&p);
+    table_free(&t);
+    raster_free(&r);
+}
+
+static void F48_every_allocation_and_every_read_may_fail(void **state) {
+    (void)state;
+    random_begin(__func__);
+    raster r = raster_make(SURFACE_HILLS, 37, 41, 5);
+    table t = table_build(&r, 2);
+    patch p = random_patch(&r);
+    rqt_update_result result;
+    size_t first = 1, failed = 0;
+    for (;; first++) {
+        table fresh = table_build(&r, 2);
+        test_heap.calls = test_heap.failures = 0;
+        test_heap.fail_from = first;
+        test_heap.fail_to = SIZE_MAX;
+        /* The codec is the table's: only rqt_update_run asks the heap. */
+        const rqt_status status = table_update(&fresh, &p, &result);
+        test_heap.fail_from = 0;
+        const bool refused = test_heap.failures > 0;
+        assert_int_equal(status, refused ? RQT_NO_MEMORY : RQT_OK);
+        table_free(&fresh);
+        failed += refused;
+        if (!refused) break;
+    }
+    CHECK(failed > 20, "only %zu requests for memory", failed);
+    for (size_t read = 1;; read += 1 + read / 8) {
+        table fresh = table_build(&r, 2);
+        fresh.fail_read = read;
+        const rqt_status status = table_update(&fresh, &p, &result);
+        const bool refused = fresh.reads >= read;
+        assert_int_equal(status, refused ? RQT_READ_FAILED : RQT_OK);
+        table_free(&fresh);
+        if (!refused) break;
+    }
+    patch_free(&p);
+    table_free(&t);
+    raster_free(&r);
+}
+
+static bool always(void *context) {
+    (void)context;
+    return true;
+}
+
+static void what_cannot_be_is_refused(void **state) {
+    (void)state;
+    random_begin(__func__);
+    raster r = raster_make(SURFACE_HILLS, 20, 20, -1);
+    table t = table_build(&r, 2);
+    int32_t q[400] = {0};
+    rqt_update update = {.lattice = t.lattice,
+                         .k = t.k,
+                         .unit = t.unit,
+                         .cost = t.cost,
+                         .before = t.statistics,
+                         .x = 0,
+                         .y = 0,
+                         .width = 20,
+                         .height = 20,
+                         .q = q,
+                         .read_block = read_block,
+                         .read_summary = read_summary,
+                         .write = write_block,
+                         .context = &t};
+    rqt_update_result result;
+    rqt_update wrong = update;
+    wrong.x = 1;
+    assert_int_equal(rqt_update_run(&wrong, &test_allocator, &result), RQT_INVALID);
+    wrong = update, wrong.height = 21;
+    assert_int_equal(rqt_update_run(&wrong, &test_allocator, &result), RQT_INVALID);
+    wrong = update, wrong.y = -1;
+    assert_int_equal(rqt_update_run(&wrong, &test_allocator, &result), RQT_INVALID);
+    wrong = update, wrong.width = 0;
+    assert_int_equal(rqt_update_run(&wrong, &test_allocator, &result), RQT_INVALID);
+    wrong = update, wrong.k = 0;
+    assert_int_equal(rqt_update_run(&wrong, &test_allocator, &result), RQT_INVALID);
+    wrong = update, wrong.unit.d = 0;
+    assert_int_equal(rqt_update_run(&wrong, &test_allocator, &result), RQT_INVALID);
+    q[7] = RQT_HEIGHT_LIMIT;
+    assert_int_equal(rqt_update_run(&update, &test_allocator, &result), RQT_INVALID);
+    q[7] = 1 - RQT_HEIGHT_LIMIT;
+    wrong = update, wrong.is_interrupted = always;
+    assert_int_equal(rqt_update_run(&wrong, &test_allocator, &result), RQT_INTERRUPTED);
+    assert_int_equal(t.blocks_written + t.summaries_written, 0);
+    assert_int_equal(rqt_update_run(&update, &test_allocator, &result), RQT_OK);
+    table_free(&t);
+    raster_free(&r);
+}
+
 int main(void) {
     random_announce();
     const struct CMUnitTest tests[] = {
         TEST(F23_an_update_equals_a_build_in_every_block_and_summary),
+        TEST(F40_an_update_equals_a_build_for_every_small_extent),
+        TEST(F22_an_update_back_restores_every_byte),
+        TEST(F44_the_order_of_two_updates_apart_does_not_matter),
+        TEST(an_update_reads_what_is_near_and_little_else),
+        TEST(a_plateau_is_not_searched_through),
+        TEST(F48_every_allocation_and_every_read_may_fail),
+        TEST(what_cannot_be_is_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -11,6 +11,10 @@
  */
 #include "update.h"
 
+static int32_t smaller(int32_t a, int32_t b) {
+    return a < b ? a : b;
+}
+
 static size_t side_of(const update *u) {
     return ((size_t)1 << u->k) + 1;
 }
@@ -99,18 +103,22 @@ static const rqt_block *read_block(update *u, const update_item *item) {
     return fits ? block : NULL;
 }
 
-/* The new samples of a block, whichever of its places they are at. */
+/* The new samples of a block, at all of its places that are one of them. */
 static void put_samples(const update *u, update_item *item) {
     const int32_t n = (int32_t)side_of(u);
-    for (int32_t v = 0; v < n; v++)
+    for (int32_t v = 0; v < n; v++) {
+        const int32_t y = smaller(item->place.y + v, u->lattice.height - 1);
+        if (y < u->area.y0 || y > u->area.y1) continue;
         for (int32_t c = 0; c < n; c++) {
+            const int32_t x = smaller(item->place.x + c, u->lattice.width - 1);
             const size_t at = (size_t)v * (size_t)n + (size_t)c;
-            const rqt_vertex s = rqt_vertex_clamp(&u->lattice, (rqt_vertex){item->place.x + c, item->place.y + v});
-            if (update_touches(u, s.x, s.y))
-                item->block.flags[at] = (uint8_t)((item->block.flags[at] & ~RQT_VALID) |
-                                                  update_sample(u, s.x, s.y, &item->block.q[at]));
-            if (item->valid) item->valid[at] = item->block.flags[at] & RQT_VALID;
+            if (x < u->area.x0 || x > u->area.x1) continue;
+            item->block.flags[at] =
+                (uint8_t)((item->block.flags[at] & ~RQT_VALID) | update_sample(u, x, y, &item->block.q[at]));
         }
+    }
+    for (size_t at = 0; item->valid && at < side_of(u) * side_of(u); at++)
+        item->valid[at] = item->block.flags[at] & RQT_VALID;
 }
 
 update_item *update_load(update *u, int32_t i, int32_t j) {
