@@ -195,6 +195,11 @@ static void what_does_not_fit_is_refused_with_a_sentence(void **unused) {
     assert_false(exists(file("nowhere.gpkg")));
     assert_int_equal(update_many(&patch, 1, file("fits.tif"), &o, false), 1);
     assert_non_null(strstr(message, "not an SQLite database"));
+    o.unit = "furlong";
+    update_refused(patch, database, &o, "the unit 'furlong'");
+    o.unit = NULL;
+    assert_int_equal(update_many(NULL, 0, database, &o, false), 1);
+    assert_string_equal(message, "no source to update from");
     update_fine(patch, database, &o, false);
     assert_int_equal(updated.samples, 20);
 }

@@ -319,7 +319,10 @@ int import_update(const char *const *sources, int count, const char *database, c
     if (message && message_size) message[0] = 0;
     GDALAllRegister();
     CPLPushErrorHandler(CPLQuietErrorHandler);
+    import_unit unit;
     bool ok = count > 0 || import_refuse(&w.job, "no source to update from");
+    if (ok && options->unit && !import_unit_parse(options->unit, &unit))
+        ok = import_refuse(&w.job, "the unit '%s' is not m, ft, us-ft or a number of metres", options->unit);
     ok = ok && begin(&w);
     for (int i = 0; i < count && ok; i++) ok = put_source(&w, sources[i], &names);
     ok = ok && finish(&w, names);
