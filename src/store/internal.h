@@ -98,13 +98,19 @@ bool store_is_interrupted(store *s, int *code);
 #define STORE_MINIMAL "_minimal" /* suffix of the tables that hold minimal errors */
 /* A writer of those tables, beside a terrain of main that is complete. writer.c */
 int store_writer_beside(sqlite3 *db, const store_terrain *t, store_writer **writer, char **error);
-/* A writer of changes to a terrain of main. writer.c */
-int store_writer_over(sqlite3 *db, const store_terrain *t, store_writer **writer, char **error);
-/* Another summary, and other bytes unless NULL, for a block that is there; its row in the index likewise. */
-int store_writer_change(store_writer *w, rqt_block_number number, const rqt_summary *before,
-                        const rqt_summary *after, const uint8_t *bytes, size_t size, char **error);
+/* The row of a block in the index, bound to ?1 .. ?9. Does it answer anything? Else it has no row. writer.c */
+bool store_bind_index(sqlite3_stmt *s, const rqt_lattice *lattice, const rqt_block_place *place,
+                      rqt_block_number number, const rqt_summary *summary);
+/* Changes to a terrain of main that is there. amend.c */
+typedef struct store_amender store_amender;
+int store_amend_begin(sqlite3 *db, const store_terrain *t, store_amender **amender, char **error);
+/* Another summary, and other bytes unless NULL, for a block; its row in the index likewise. */
+int store_amend_block(store_amender *a, rqt_block_number number, const rqt_summary *before,
+                      const rqt_summary *after, const uint8_t *bytes, size_t size, char **error);
 /* The terrain's row, when all changes are made. */
-int store_writer_amend(store_writer *w, const rqt_statistics *statistics, const char *source, char **error);
+int store_amend_terrain(store_amender *a, const rqt_statistics *statistics, const char *source, char **error);
+void store_amend_free(store_amender *a);
+/* The tables of its minimal errors, which are there. */
 int store_drop_minimal(sqlite3 *db, int64_t id, char **error);
 /* |f|/d: metres of a height quantum. terrain.c */
 double store_quantum(const store_terrain *t);

@@ -17,7 +17,7 @@
 struct store_update {
     store *s;
     const store_terrain *t;
-    store_writer *writer;
+    store_amender *amender;
     rqt_statistics statistics;
     store_update_report report;
     int32_t *q; /* a part */
@@ -63,7 +63,7 @@ static bool write_block(void *context, rqt_block_number number, const rqt_summar
     else
         u->code = SQLITE_OK;
     if (u->code == SQLITE_OK)
-        u->code = store_writer_change(u->writer, number, before, after, block ? u->bytes : NULL, size, u->error);
+        u->code = store_amend_block(u->amender, number, before, after, block ? u->bytes : NULL, size, u->error);
     store_forget_block(u->s, u->t, number);
     u->report.blocks += block != NULL;
     u->report.summaries += block == NULL;
@@ -97,7 +97,7 @@ int store_update_begin(sqlite3 *db, const char *name, store_update **update, con
         u->q = sqlite3_malloc64((sqlite3_uint64)PART * PART * sizeof *u->q);
         u->valid = sqlite3_malloc64((sqlite3_uint64)PART * PART);
         u->bytes = sqlite3_malloc64(rqt_block_bound(t->k));
-        code = u->q && u->valid && u->bytes ? store_writer_over(db, t, &u->writer, error) : SQLITE_NOMEM;
+        code = u->q && u->valid && u->bytes ? store_amend_begin(db, t, &u->amender, error) : SQLITE_NOMEM;
     }
     if (code != SQLITE_OK) {
         store_update_free(u);
@@ -110,7 +110,7 @@ int store_update_begin(sqlite3 *db, const char *name, store_update **update, con
 
 void store_update_free(store_update *u) {
     if (!u) return;
-    store_writer_free(u->writer);
+    store_amend_free(u->amender);
     store_close(u->s);
     sqlite3_free(u->q);
     sqlite3_free(u->valid);
@@ -284,7 +284,7 @@ int store_update_finish(store_update *u, const char *sources, bool (*progress)(v
     if (u->report.changed == 0) return SQLITE_OK;
     const bool minimal = store_minimal(u->s, u->t) != NULL;
     char *source = join_lines(u->t->source, sources);
-    int code = source ? store_writer_amend(u->writer, &u->statistics, source, error) : SQLITE_NOMEM;
+    int code = source ? store_amend_terrain(u->amender, &u->statistics, source, error) : SQLITE_NOMEM;
     sqlite3_free(source);
     if (code == SQLITE_OK && minimal) code = renew_minimal(u, store_connection(u->s), progress, context, error);
     return code;

@@ -1,5 +1,4 @@
-/* writer.c - one terrain into a database, or changes to one that is there: its row, its tables, its blocks, and its
- * place in a GeoPackage.
+/* writer.c - one terrain into a database: its row, its tables, its blocks, and its place in a GeoPackage.
  *
  * The caller owns the transaction, so that nothing is ever half there: the row says complete = 0 until the last
  * call, and a crash before the commit leaves the database as it was.
@@ -18,7 +17,6 @@ struct store_writer {
     rqt_lattice lattice;
     int64_t blocks, bytes;
     sqlite3_stmt *put_block, *put_index;
-    sqlite3_stmt *size, *change_block, *change_summary, *change_index, *drop_index; /* of one that is there */
 };
 
 /* Several statements, one after the other. */
@@ -65,28 +63,21 @@ static int register_attributes(sqlite3 *db, const char *table, const char *ident
     return code;
 }
 
-/* The tables of a terrain, of a suffix, and their place in a GeoPackage. */
-static int drop_tables(sqlite3 *db, int64_t id, const char *suffix, char **error) {
+static int drop_terrain(sqlite3 *db, int64_t id, char **error) {
     char *sql =
-        sqlite3_mprintf("DROP TABLE IF EXISTS main.rqt_index_%lld%s; DROP TABLE IF EXISTS main.rqt_block_%lld%s; ",
-                        id, suffix, id, suffix);
-    char *contents =
-        has_table(db, "gpkg_contents")
-            ? sqlite3_mprintf("DELETE FROM main.gpkg_contents WHERE table_name = 'rqt_block_%lld%s'", id, suffix)
-            : sqlite3_mprintf("");
+        sqlite3_mprintf("DROP TABLE IF EXISTS main.rqt_index_%lld; DROP TABLE IF EXISTS main.rqt_block_%lld; "
+                        "DROP TABLE IF EXISTS main.rqt_index_%lld%s; DROP TABLE IF EXISTS main.rqt_block_%lld%s; "
+                        "DELETE FROM main.rqt_terrain WHERE id = %lld;",
+                        id, id, id, STORE_MINIMAL, id, STORE_MINIMAL, id);
+    char *contents = has_table(db, "gpkg_contents")
+                         ? sqlite3_mprintf("DELETE FROM main.gpkg_contents WHERE table_name IN "
+                                           "('rqt_block_%lld', 'rqt_block_%lld%s')",
+                                           id, id, STORE_MINIMAL)
+                         : sqlite3_mprintf("");
     int code = sql && contents ? run(db, sql, error, "replacing a terrain") : SQLITE_NOMEM;
     if (code == SQLITE_OK) code = run(db, contents, error, "replacing a terrain");
     sqlite3_free(sql);
     sqlite3_free(contents);
-    return code;
-}
-
-static int drop_terrain(sqlite3 *db, int64_t id, char **error) {
-    int code = drop_tables(db, id, "", error);
-    if (code == SQLITE_OK) code = drop_tables(db, id, STORE_MINIMAL, error);
-    char *sql = sqlite3_mprintf("DELETE FROM main.rqt_terrain WHERE id = %lld", id);
-    if (code == SQLITE_OK) code = sql ? run(db, sql, error, "replacing a terrain") : SQLITE_NOMEM;
-    sqlite3_free(sql);
     return code;
 }
 
@@ -185,21 +176,16 @@ static bool put_interval(sqlite3_stmt *s, int at, rqt_interval interval) {
     return answers;
 }
 
-/* A block that answers nothing gets no row. */
-static int put_index(store_writer *w, const rqt_block_place *place, rqt_block_number number,
-                     const rqt_summary *summary, char **error) {
-    sqlite3_stmt *s = w->put_index;
-    const int32_t last_x = w->lattice.width - 1, last_y = w->lattice.height - 1;
+bool store_bind_index(sqlite3_stmt *s, const rqt_lattice *lattice, const rqt_block_place *place,
+                      rqt_block_number number, const rqt_summary *summary) {
+    const int32_t last_x = lattice->width - 1, last_y = lattice->height - 1;
     sqlite3_bind_int64(s, 1, (sqlite3_int64)number);
     sqlite3_bind_int(s, 2, place->x);
     sqlite3_bind_int(s, 3, place->x + place->side < last_x ? place->x + place->side : last_x);
     sqlite3_bind_int(s, 4, place->y);
     sqlite3_bind_int(s, 5, place->y + place->side < last_y ? place->y + place->side : last_y);
     const bool tol = put_interval(s, 6, summary->tol), exact = put_interval(s, 8, summary->exact);
-    if (!tol && !exact) return SQLITE_OK;
-    sqlite3_step(s);
-    const int code = sqlite3_reset(s);
-    return code == SQLITE_OK ? SQLITE_OK : store_fail_db(error, w->db, code, "writing the index");
+    return tol || exact;
 }
 
 int store_writer_block(store_writer *w, rqt_block_number number, const rqt_summary *summary, const uint8_t *bytes,
@@ -220,7 +206,11 @@ int store_writer_block(store_writer *w, rqt_block_number number, const rqt_summa
     w->blocks++;
     w->bytes += (int64_t)size + RQT_SUMMARY_BYTES;
 
-    return put_index(w, &place, number, summary, error);
+    s = w->put_index;
+    if (!store_bind_index(s, &w->lattice, &place, number, summary)) return SQLITE_OK;
+    sqlite3_step(s);
+    code = sqlite3_reset(s);
+    return code == SQLITE_OK ? SQLITE_OK : store_fail_db(error, w->db, code, "writing the index");
 }
 
 int store_writer_finish(store_writer *w, rqt_code max_error, char **error) {
@@ -234,119 +224,9 @@ int store_writer_finish(store_writer *w, rqt_code max_error, char **error) {
     return code;
 }
 
-/* ------------------------------------------------------------------------------------ a terrain that is there */
-
-int store_writer_over(sqlite3 *db, const store_terrain *t, store_writer **writer, char **error) {
-    *writer = NULL;
-    store_writer *w = sqlite3_malloc(sizeof *w);
-    if (!w) return SQLITE_NOMEM;
-    *w = (store_writer){.db = db,
-                        .id = t->id,
-                        .suffix = "",
-                        .k = t->k,
-                        .lattice = t->lattice,
-                        .blocks = t->blocks,
-                        .bytes = t->bytes};
-    const struct {
-        sqlite3_stmt **out;
-        const char *format;
-    } wanted[] = {
-        {&w->put_index, "INSERT INTO main.rqt_index_%lld%s VALUES(?1,?2,?3,?4,?5,?6,?7,?8,?9)"},
-        {&w->size, "SELECT length(data) FROM main.rqt_block_%lld%s WHERE id = ?1"},
-        {&w->change_block, "UPDATE main.rqt_block_%lld%s SET summary = ?2, data = ?3 WHERE id = ?1"},
-        {&w->change_summary, "UPDATE main.rqt_block_%lld%s SET summary = ?2 WHERE id = ?1"},
-        {&w->change_index,
-         "UPDATE main.rqt_index_%lld%s SET tol0 = ?2, tol1 = ?3, exact0 = ?4, exact1 = ?5 WHERE id = ?1"},
-        {&w->drop_index, "DELETE FROM main.rqt_index_%lld%s WHERE id = ?1"},
-    };
-    int code = SQLITE_OK;
-    for (size_t i = 0; i < sizeof wanted / sizeof *wanted && code == SQLITE_OK; i++)
-        code = prepare(w, wanted[i].out, wanted[i].format, error);
-    if (code != SQLITE_OK)
-        store_writer_free(w);
-    else
-        *writer = w;
-    return code;
-}
-
-/* Run a statement that changes the one row of a block. */
-static int change_row(store_writer *w, sqlite3_stmt *s, rqt_block_number number, const char *doing, char **error) {
-    sqlite3_bind_int64(s, 1, (sqlite3_int64)number);
-    sqlite3_step(s);
-    const int code = sqlite3_reset(s);
-    sqlite3_clear_bindings(s);
-    if (code != SQLITE_OK) return store_fail_db(error, w->db, code, doing);
-    if (sqlite3_changes(w->db) == 1) return SQLITE_OK;
-    return store_fail(error, SQLITE_CORRUPT_VTAB, "%s: block %llu has no row there", doing, number);
-}
-
-static bool answers(const rqt_summary *s) {
-    return s->tol.em < s->tol.em_parent || s->exact.em < s->exact.em_parent;
-}
-
-static int change_index(store_writer *w, rqt_block_number number, const rqt_summary *before,
-                        const rqt_summary *after, char **error) {
-    rqt_block_place place;
-    const bool same = before->tol.em == after->tol.em && before->tol.em_parent == after->tol.em_parent &&
-                      before->exact.em == after->exact.em && before->exact.em_parent == after->exact.em_parent;
-    if (same || (!answers(before) && !answers(after))) return SQLITE_OK;
-    if (!answers(after)) return change_row(w, w->drop_index, number, "writing the index", error);
-    if (!answers(before)) {
-        (void)rqt_block_locate(&w->lattice, w->k, number, &place);
-        return put_index(w, &place, number, after, error);
-    }
-    (void)put_interval(w->change_index, 2, after->tol);
-    (void)put_interval(w->change_index, 4, after->exact);
-    return change_row(w, w->change_index, number, "writing the index", error);
-}
-
-int store_writer_change(store_writer *w, rqt_block_number number, const rqt_summary *before,
-                        const rqt_summary *after, const uint8_t *bytes, size_t size, char **error) {
-    uint8_t encoded[RQT_SUMMARY_BYTES];
-    sqlite3_stmt *s = bytes ? w->change_block : w->change_summary;
-    rqt_summary_encode(after, encoded);
-    if (bytes) {
-        sqlite3_bind_int64(w->size, 1, (sqlite3_int64)number);
-        if (sqlite3_step(w->size) == SQLITE_ROW) w->bytes += (int64_t)size - sqlite3_column_int64(w->size, 0);
-        const int code = sqlite3_reset(w->size);
-        if (code != SQLITE_OK) return store_fail_db(error, w->db, code, "reading a block");
-        sqlite3_bind_blob64(s, 3, bytes, size, SQLITE_STATIC);
-    }
-    sqlite3_bind_blob(s, 2, encoded, sizeof encoded, SQLITE_STATIC);
-    const int code = change_row(w, s, number, "writing a block", error);
-    return code == SQLITE_OK ? change_index(w, number, before, after, error) : code;
-}
-
-/* Its tables in a GeoPackage have changed just now. */
-static int touch_contents(store_writer *w, char **error) {
-    if (!has_table(w->db, "gpkg_contents")) return SQLITE_OK;
-    char *sql =
-        sqlite3_mprintf("UPDATE main.gpkg_contents SET last_change = strftime('%%Y-%%m-%%dT%%H:%%M:%%fZ', 'now') "
-                        "WHERE table_name IN ('rqt_terrain', 'rqt_block_%lld')",
-                        w->id);
-    const int code = sql ? run(w->db, sql, error, "noting the change in the GeoPackage") : SQLITE_NOMEM;
-    sqlite3_free(sql);
-    return code;
-}
-
-int store_writer_amend(store_writer *w, const rqt_statistics *statistics, const char *source, char **error) {
-    char *sql = sqlite3_mprintf("UPDATE main.rqt_terrain SET source = %Q, voids = %lld, min_q = %d, max_q = %d, "
-                                "blocks = %lld, bytes = %lld, max_error = %d WHERE id = %lld",
-                                source, statistics->voids, statistics->min_q, statistics->max_q, w->blocks,
-                                w->bytes, statistics->max_error, w->id);
-    const int code = sql ? run(w->db, sql, error, "changing the terrain's row") : SQLITE_NOMEM;
-    sqlite3_free(sql);
-    return code == SQLITE_OK ? touch_contents(w, error) : code;
-}
-
-int store_drop_minimal(sqlite3 *db, int64_t id, char **error) {
-    return drop_tables(db, id, STORE_MINIMAL, error);
-}
-
 void store_writer_free(store_writer *w) {
     if (!w) return;
-    sqlite3_stmt *const all[] = {w->put_block,      w->put_index,    w->size,      w->change_block,
-                                 w->change_summary, w->change_index, w->drop_index};
-    for (size_t i = 0; i < sizeof all / sizeof *all; i++) sqlite3_finalize(all[i]);
+    sqlite3_finalize(w->put_block);
+    sqlite3_finalize(w->put_index);
     sqlite3_free(w);
 }
