@@ -6,6 +6,7 @@
 #include <signal.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
+#include <time.h>
 
 static import_update_report updated;
 
@@ -334,6 +335,31 @@ static void execute(sqlite3 *db, const char *sql) {
     if (sqlite3_exec(db, sql, NULL, NULL, NULL) != SQLITE_OK) fail_msg("%s: %s", sql, sqlite3_errmsg(db));
 }
 
+/* Runs of filled samples end where data was put in. */
+static void what_was_filled_is_so_no_longer_where_there_is_data(void **unused) {
+    (void)unused;
+    import_options o = defaults();
+    const char *database = import_small(file("t.gpkg"), &o);
+    sqlite3 *db;
+    assert_int_equal(sqlite3_open(database, &db), SQLITE_OK);
+    execute(
+        db,
+        "CREATE TABLE rqt_fill_1(id INTEGER PRIMARY KEY, row INTEGER, col0 INTEGER, col1 INTEGER, kind INTEGER);"
+        "INSERT INTO rqt_fill_1(row, col0, col1, kind) VALUES (4,0,39,1), (5,0,4,2), (5,12,14,1), (6,7,8,1), "
+        "(9,0,39,2), (20,3,3,1)");
+    sqlite3_close(db);
+    /* Columns 5 .. 9, rows 5 .. 8; and 11 .. 15, 3 .. 6. */
+    update_fine(shifted_window("a.tif", 50, 50, GDT_Int16, 0, 0), database, &o, false);
+    update_fine(shifted_window("b.tif", 110, 30, GDT_Int16, 0, 0), database, &o, false);
+    char *runs =
+        dump(database, "SELECT group_concat(id || ':' || row || ':' || col0 || '-' || col1 || ':' || kind, ' ') "
+                       "FROM (SELECT * FROM rqt_fill_1 ORDER BY id)");
+    char *wanted = dump(database, "SELECT '1:4:0-10:1 2:4:16-39:1 3:5:0-4:2 4:9:0-39:2 5:20:3-3:1'");
+    assert_string_equal(runs, wanted);
+    sqlite3_free(runs);
+    sqlite3_free(wanted);
+}
+
 static int32_t height_of(store *s) {
     const store_terrain *t;
     int32_t q;
@@ -482,6 +508,13 @@ static void F49_a_killed_update_leaves_the_old_state_or_the_new_one(void **unuse
     update_fine(patch, database, &o, false);
     assert_int_equal(CPLCopyFile(fresh, database), 0);
     int seen[2] = {0, 0};
+    struct timespec begin_at, end_at;
+    clock_gettime(CLOCK_MONOTONIC, &begin_at);
+    update_fine(back, database, &o, false);
+    update_fine(patch, database, &o, false);
+    clock_gettime(CLOCK_MONOTONIC, &end_at);
+    const double both =
+        1e6 * (double)(end_at.tv_sec - begin_at.tv_sec) + 1e-3 * (double)(end_at.tv_nsec - begin_at.tv_nsec);
     for (int kill_number = 0; kill_number < 24; kill_number++) {
         const pid_t child = fork();
         if (child == 0) {
@@ -492,7 +525,7 @@ static void F49_a_killed_update_leaves_the_old_state_or_the_new_one(void **unuse
                     _exit(9);
             }
         }
-        usleep((useconds_t)(5000 + 150000 * uniform()));
+        usleep((useconds_t)fmin(3 * both * uniform(), 400000));
         assert_int_equal(kill(child, SIGKILL), 0);
         int status = 0;
         assert_int_equal(waitpid(child, &status, 0), child);
@@ -522,6 +555,7 @@ int main(void) {
         TEST(heights_keep_the_terrains_unit_and_steps),
         TEST(a_long_window_goes_in_parts),
         TEST(stored_minimal_errors_are_made_anew),
+        TEST(what_was_filled_is_so_no_longer_where_there_is_data),
         TEST(F52_a_rollback_leaves_no_block_of_the_update_behind),
         TEST(F51_others_see_the_old_state_or_the_new_one),
         TEST(F50_a_stop_and_a_full_disk_leave_everything_as_it_was),

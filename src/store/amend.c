@@ -126,6 +126,89 @@ int store_amend_terrain(store_amender *a, const rqt_statistics *statistics, cons
         "noting the change in the GeoPackage", error);
 }
 
+/* ------------------------------------------------------------------------------------------------ filled samples
+ * -- */
+
+typedef struct filled_run {
+    sqlite3_int64 id, row, first, last, kind;
+} filled_run;
+
+static bool has_filled(const store_amender *a) {
+    char table[64];
+    sqlite3_snprintf(sizeof table, table, "rqt_fill_%lld", a->id);
+    return sqlite3_table_column_metadata(a->db, "main", table, "kind", NULL, NULL, NULL, NULL, NULL) == SQLITE_OK;
+}
+
+/* Those that meet a window; *runs is to be released with sqlite3_free. */
+static int find_filled(store_amender *a, const int32_t window[4], filled_run **runs, size_t *count, char **error) {
+    sqlite3_stmt *s = NULL;
+    char *sql = sqlite3_mprintf("SELECT id, row, col0, col1, kind FROM main.rqt_fill_%lld "
+                                "WHERE row BETWEEN ?1 AND ?2 AND col0 <= ?4 AND col1 >= ?3",
+                                a->id);
+    int code = sql ? sqlite3_prepare_v2(a->db, sql, -1, &s, NULL) : SQLITE_NOMEM;
+    sqlite3_free(sql);
+    for (int i = 0; i < 4 && code == SQLITE_OK; i++) code = sqlite3_bind_int(s, i + 1, window[i]);
+    while (code == SQLITE_OK && (code = sqlite3_step(s)) == SQLITE_ROW) {
+        filled_run *more = sqlite3_realloc64(*runs, (*count + 1) * sizeof **runs);
+        code = more ? SQLITE_OK : SQLITE_NOMEM;
+        if (!more) break;
+        *runs = more;
+        more[(*count)++] =
+            (filled_run){sqlite3_column_int64(s, 0), sqlite3_column_int64(s, 1), sqlite3_column_int64(s, 2),
+                         sqlite3_column_int64(s, 3), sqlite3_column_int64(s, 4)};
+    }
+    sqlite3_finalize(s);
+    return code == SQLITE_DONE ? SQLITE_OK : store_fail_db(error, a->db, code, "reading what was filled");
+}
+
+/* What stays of a run: the samples that the state keeps. */
+static int cut_run(store_amender *a, const filled_run *r, int32_t col, int32_t row, int32_t width,
+                   const uint8_t *state, bool *cut, char **error) {
+    sqlite3_str *sql = sqlite3_str_new(NULL);
+    const uint8_t *const line = state + (size_t)(r->row - row) * (size_t)width;
+    bool same = true;
+    sqlite3_str_appendf(sql, "DELETE FROM main.rqt_fill_%lld WHERE id = %lld;", a->id, r->id);
+    for (sqlite3_int64 x = r->first, begin = x; x <= r->last + 1; x++) {
+        const bool stays = x <= r->last && (x < col || x >= col + width || line[x - col] == STORE_KEEP);
+        if (stays) continue;
+        if (begin < x)
+            sqlite3_str_appendf(
+                sql, "INSERT INTO main.rqt_fill_%lld(row, col0, col1, kind) VALUES(%lld,%lld,%lld,%lld);", a->id,
+                r->row, begin, x - 1, r->kind);
+        same = same && x > r->last;
+        begin = x + 1;
+    }
+    char *text = sqlite3_str_finish(sql);
+    if (same) {
+        sqlite3_free(text);
+        return SQLITE_OK;
+    }
+    *cut = true;
+    return run(a->db, text, "writing what was filled", error);
+}
+
+int store_amend_filled(store_amender *a, int32_t col, int32_t row, int32_t width, int32_t height,
+                       const uint8_t *state, char **error) {
+    const int32_t window[4] = {row, row + height - 1, col, col + width - 1};
+    filled_run *runs = NULL;
+    size_t count = 0;
+    bool cut = false;
+    if (!has_filled(a)) return SQLITE_OK;
+    int code = find_filled(a, window, &runs, &count, error);
+    for (size_t i = 0; i < count && code == SQLITE_OK; i++)
+        code = cut_run(a, &runs[i], col, row, width, state, &cut, error);
+    sqlite3_free(runs);
+    if (code != SQLITE_OK || !cut) return code;
+    /* By id they run from north to south and from west to east. */
+    return run(
+        a->db,
+        sqlite3_mprintf("UPDATE main.rqt_fill_%lld AS f SET id = -o.n FROM (SELECT id, row_number() OVER (ORDER BY "
+                        "row, col0) AS n FROM main.rqt_fill_%lld) AS o WHERE o.id = f.id; "
+                        "UPDATE main.rqt_fill_%lld SET id = -id;",
+                        a->id, a->id, a->id),
+        "writing what was filled", error);
+}
+
 int store_drop_minimal(sqlite3 *db, int64_t id, char **error) {
     const int code = run(db,
                          sqlite3_mprintf("DROP TABLE main.rqt_index_%lld%s; DROP TABLE main.rqt_block_%lld%s", id,

@@ -107,6 +107,9 @@ int store_amend_begin(sqlite3 *db, const store_terrain *t, store_amender **amend
 /* Another summary, and other bytes unless NULL, for a block; its row in the index likewise. */
 int store_amend_block(store_amender *a, rqt_block_number number, const rqt_summary *before,
                       const rqt_summary *after, const uint8_t *bytes, size_t size, char **error);
+/* Samples of a window that are not kept are no longer filled ones (rqt_fill_N, where there is one). */
+int store_amend_filled(store_amender *a, int32_t col, int32_t row, int32_t width, int32_t height,
+                       const uint8_t *state, char **error);
 /* The terrain's row, when all changes are made. */
 int store_amend_terrain(store_amender *a, const rqt_statistics *statistics, const char *source, char **error);
 void store_amend_free(store_amender *a);

@@ -222,7 +222,7 @@ int store_update_samples(store_update *u, int32_t col, int32_t row, int32_t widt
             u->done += (double)(next_x - x) * (next_y - y) / ((double)width * height);
         }
     }
-    return SQLITE_OK;
+    return store_amend_filled(u->amender, col, row, width, height, state, error);
 }
 
 /* ------------------------------------------------------------------------------------------------------- the end
