@@ -363,6 +363,27 @@ static void F40_an_update_equals_a_build_for_every_small_extent(void **state) {
         }
 }
 
+/* Where coarse blocks reach over the edge and voids touch it: vertices past the raster are kept for others' sake.
+ */
+static void F16_voids_at_the_raster_s_edge_are_built_alike(void **state) {
+    (void)state;
+    random_begin(__func__);
+    for (int round = 0; round < 120; round++) {
+        raster r = raster_make(round % 2 ? SURFACE_HILLS : SURFACE_CLIFF, random_between(17, 40),
+                               random_between(17, 40), 0);
+        raster_add_lake(&r);
+        table t = table_build(&r, random_between(1, 4));
+        patch p = random_patch(&r);
+        rqt_update_result result;
+        assert_int_equal(table_update(&t, &p, &result), RQT_OK);
+        exchange(&r, &p);
+        check_equals_build(&t, &r, "edge", &p);
+        patch_free(&p);
+        table_free(&t);
+        raster_free(&r);
+    }
+}
+
 static void check_same_rows(const table *a, const table *b, const char *what) {
     assert_int_equal(a->count, b->count);
     for (size_t n = 0; n < a->count; n++)
@@ -562,6 +583,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         TEST(F23_an_update_equals_a_build_in_every_block_and_summary),
         TEST(F40_an_update_equals_a_build_for_every_small_extent),
+        TEST(F16_voids_at_the_raster_s_edge_are_built_alike),
         TEST(F22_an_update_back_restores_every_byte),
         TEST(F44_the_order_of_two_updates_apart_does_not_matter),
         TEST(an_update_reads_what_is_near_and_little_else),
