@@ -171,6 +171,25 @@ bench-table1: ## share of vertices over eps beside the paper's table 1
 	@$(MAKE) --no-print-directory -j2 products
 	@BUILD=$(BUILD) ./tests/bench/bench_table1.sh
 
+# What published methods give on the catalogue's inputs (tests/catalogue.txt), beside rqt.
+.PHONY: stability check-stability
+$(BUILD)/tests/stability.o: tests/bench/stability.c
+	@mkdir -p $(@D)
+	@echo "  compile $<"; $(CC) $(CFLAGS) $(INCLUDES) -Itests -c $< -o $@
+$(BUILD)/tests/stability: $(BUILD)/tests/stability.o $(BUILD)/tests/libtest.a
+	@$(CXX) $(SANITIZE) -o $@ $^ $(LIBS_TEST)
+stability: ## examples/STABILITY.md: what breaks published methods, what they give, what rqt gives
+	@./src/install-packages.sh build test
+	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/stability
+	@BUILD=$(BUILD) ./tests/bench/stability.sh examples/charts/stability.png > $(BUILD)/STABILITY.md
+	@mv $(BUILD)/STABILITY.md examples/STABILITY.md && echo "examples/STABILITY.md and its picture are written"
+check-stability: ## fail when that page is not what the code gives, or a case has no test or nothing that fails it
+	@./src/install-packages.sh build test
+	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/stability
+	@BUILD=$(BUILD) ./tests/bench/stability.sh | diff -u examples/STABILITY.md - && echo "examples/STABILITY.md is what make stability writes"
+	@./tests/check_catalogue.sh
+check-docs: check-stability
+
 chart: ## speed against accuracy, drawn: pictures in build/chart; peers from npm where there is one; DATA=dir
 	@./src/install-packages.sh build test
 	@./src/install-packages.sh peers || echo "No node: the charts go without peers" >&2
