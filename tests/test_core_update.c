@@ -365,7 +365,7 @@ static void F40_an_update_equals_a_build_for_every_small_extent(void **state) {
 
 /* Where coarse blocks reach over the edge and voids touch it: vertices past the raster are kept for others' sake.
  */
-static void F16_voids_at_the_raster_s_edge_are_built_alike(void **state) {
+static void voids_at_the_raster_s_edge_are_built_alike(void **state) {
     (void)state;
     random_begin(__func__);
     for (int round = 0; round < 120; round++) {
@@ -583,7 +583,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         TEST(F23_an_update_equals_a_build_in_every_block_and_summary),
         TEST(F40_an_update_equals_a_build_for_every_small_extent),
-        TEST(F16_voids_at_the_raster_s_edge_are_built_alike),
+        TEST(voids_at_the_raster_s_edge_are_built_alike),
         TEST(F22_an_update_back_restores_every_byte),
         TEST(F44_the_order_of_two_updates_apart_does_not_matter),
         TEST(an_update_reads_what_is_near_and_little_else),

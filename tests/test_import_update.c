@@ -102,7 +102,7 @@ static int below(int n) {
 }
 
 /* Random rasters and windows, new heights and voids, against a database made anew; and back again. */
-static void F23_F22_a_database_equals_its_rebuild_and_goes_back(void **unused) {
+static void F22_a_database_equals_its_rebuild_and_goes_back(void **unused) {
     (void)unused;
     const GDALDataType types[] = {GDT_Int16, GDT_Int32, GDT_Float32, GDT_Float64};
     state = 7;
@@ -548,7 +548,7 @@ static void F49_a_killed_update_leaves_the_old_state_or_the_new_one(void **unuse
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        TEST(F23_F22_a_database_equals_its_rebuild_and_goes_back),
+        TEST(F22_a_database_equals_its_rebuild_and_goes_back),
         TEST(what_does_not_fit_is_refused_with_a_sentence),
         TEST(what_lies_outside_is_left_out_and_told),
         TEST(a_later_source_wins_and_provenance_says_what_was_put_in),
