@@ -438,6 +438,50 @@ void rqt_build_summary(const rqt_build *build, const rqt_sweep *sweep, rqt_block
 /* The largest finite error of the terrain, when all is built. */
 rqt_code rqt_build_max_error(const rqt_build *build);
 
+/* -------------------------------------------------------------------------------------------- update --
+ * New samples for a rectangle of a terrain whose blocks are kept somewhere: which blocks and summaries become
+ * others, and what they become. That is what a build over the changed raster gives, bit for bit. What it takes
+ * grows with the rectangle, and for coarser vertices near it with what a branch and bound over summaries has to
+ * look at; not with the terrain. */
+typedef struct rqt_statistics {
+    int64_t voids;
+    int32_t min_q, max_q; /* of the valid samples; both 0 when there are none */
+    rqt_code max_error;   /* rqt_build_max_error */
+} rqt_statistics;
+
+typedef struct rqt_update {
+    rqt_lattice lattice;
+    int k;
+    rqt_unit unit;
+    rqt_void_cost cost;
+    rqt_statistics before;
+    int32_t x, y, width, height; /* the rectangle, inside the raster */
+    const int32_t *q;            /* width * height, |q| < RQT_HEIGHT_LIMIT; anything where void */
+    const uint8_t *valid;        /* 0 or 1; NULL: all */
+    /* The blocks as they are: decoded with their corners (rqt_block_set_corners), valid until the next call. NULL
+     * and false: the update stops with RQT_READ_FAILED. Only blocks that exist are asked for, and none after it has
+     * been written. */
+    const rqt_block *(*read_block)(void *context, rqt_block_number number);
+    bool (*read_summary)(void *context, rqt_block_number number, rqt_summary *summary);
+    /* A block that changes, each once, in ascending order of number within a level, when everything is known. block
+     * NULL: its bytes stay as they are. before and after may be equal. false stops with RQT_READ_FAILED. */
+    bool (*write)(void *context, rqt_block_number number, const rqt_summary *before, const rqt_summary *after,
+                  const rqt_block *block);
+    bool (*is_interrupted)(void *context); /* may be NULL */
+    void *context;
+} rqt_update;
+
+typedef struct rqt_update_result {
+    rqt_statistics after;
+    int64_t changed;  /* samples of the rectangle that are others now; 0: nothing has been written */
+    int64_t measured; /* samples that triangles were measured by, each time */
+    int64_t cells;    /* summaries that the branch and bound has looked at */
+} rqt_update_result;
+
+/* RQT_INVALID when the rectangle is not in the raster, or a height not within the limit. RQT_CORRUPT when what is
+ * read cannot be. Memory: about 15 bytes a sample of the rectangle, and the blocks that change, decoded. */
+rqt_status rqt_update_run(const rqt_update *update, const rqt_allocator *allocator, rqt_update_result *result);
+
 /* ------------------------------------------------------------------------------------------- regions --
  * A geometry as it came (WKT or EWKT text, GeoPackage or SpatiaLite bytes), in its own coordinates; and a
  * region: the same in sample coordinates, each rounded to the nearest 2^-20 sample, exact integers after that.
