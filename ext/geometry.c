@@ -100,17 +100,10 @@ static int transform(sqlite3 *db, const store_terrain *t, const char *what, rqt_
     return code;
 }
 
-int request_geometry(connection *c, const store_terrain *t, sqlite3_value *value, const char *what,
-                     rqt_geometry **geometry, char **error) {
+int request_geometry_bytes(connection *c, const store_terrain *t, const void *bytes, size_t n, bool text,
+                           const char *what, rqt_geometry **geometry, char **error) {
     *geometry = NULL;
-    const int type = value ? sqlite3_value_type(value) : SQLITE_NULL;
-    if (type == SQLITE_NULL) return SQLITE_OK;
-    if (type == SQLITE_INTEGER || type == SQLITE_FLOAT)
-        return fail(error, "%s must be WKT text, a geometry or NULL; it is a number", what);
-    const void *bytes = type == SQLITE_TEXT ? (const void *)sqlite3_value_text(value) : sqlite3_value_blob(value);
-    const size_t n = (size_t)sqlite3_value_bytes(value);
-    if (!bytes && n > 0) return SQLITE_NOMEM;
-    int code = parse(bytes, n, type == SQLITE_TEXT, what, geometry, error);
+    int code = parse(bytes, n, text, what, geometry, error);
     if (code != SQLITE_OK) return code;
     const int32_t srid = rqt_geometry_srid(*geometry);
     if (srid == 0 || srid == t->srid || (srid == 4326 && t->wgs84) || rqt_geometry_is_empty(*geometry))
@@ -121,4 +114,17 @@ int request_geometry(connection *c, const store_terrain *t, sqlite3_value *value
         *geometry = NULL;
     }
     return code;
+}
+
+int request_geometry(connection *c, const store_terrain *t, sqlite3_value *value, const char *what,
+                     rqt_geometry **geometry, char **error) {
+    *geometry = NULL;
+    const int type = value ? sqlite3_value_type(value) : SQLITE_NULL;
+    if (type == SQLITE_NULL) return SQLITE_OK;
+    if (type == SQLITE_INTEGER || type == SQLITE_FLOAT)
+        return fail(error, "%s must be WKT text, a geometry or NULL; it is a number", what);
+    const void *bytes = type == SQLITE_TEXT ? (const void *)sqlite3_value_text(value) : sqlite3_value_blob(value);
+    const size_t n = (size_t)sqlite3_value_bytes(value);
+    if (!bytes && n > 0) return SQLITE_NOMEM;
+    return request_geometry_bytes(c, t, bytes, n, type == SQLITE_TEXT, what, geometry, error);
 }

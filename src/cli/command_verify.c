@@ -19,7 +19,7 @@ static const char HELP[] =
     "  --eps E         tolerance in metres of height, or a list of them: 1,2,5\n"
     "  --region R      x0,y0,x1,y1 or WKT, in the terrain's coordinates (default: all)\n"
     "  --terrain T     which terrain (default: the only one)\n"
-    "  --mode M        at the region's border: cover (default), snap or cut, as rqt mesh has it\n"
+    "  --mode M        at the region's border: cover (default), snap, border or cut, as rqt mesh has it\n"
     "  --outline O     of voids: exact (default) or tol; uncovered samples are those that it promises to cover\n"
     "  --help          this text\n"
     "\n"

@@ -104,8 +104,7 @@ static int set_word(const char **field, const char *option, const char *const *w
 }
 
 int cli_set_mode(cli_answer_options *options, const char *mode) {
-    static const char *const modes[] = {"cover", "snap", "cut", NULL};
-    if (!strcmp(mode, "border")) return cli_usage("--mode %s is not in this version", mode);
+    static const char *const modes[] = {"cover", "snap", "border", "cut", NULL};
     return set_word(&options->mode, "mode", modes, mode);
 }
 

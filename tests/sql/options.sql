@@ -4,6 +4,12 @@ SELECT count(*) FROM rqt_triangles(NULL, 1, NULL, '{}');
 --> 4
 SELECT count(*) FROM rqt_triangles(NULL, 1, NULL, ' { "mode" : "cover" } ');
 --> 4
+SELECT count(*) FROM rqt_triangles(NULL, 1, NULL, '{"mode":"border"}');
+--> 4
+SELECT count(*) FROM rqt_triangles(NULL, 9, NULL, '{"detail":[]}');
+--> 2
+SELECT count(*) FROM rqt_triangles(NULL, 9, NULL, '{"detail":[["POINT(0 0)", 1]]}');
+--> 4
 SELECT count(*) FROM rqt_triangles(NULL, 1, NULL, '{"outline":"exact"}');
 --> 4
 SELECT count(*) FROM rqt_triangles(NULL, 1, NULL, '{"outline":"tol"}');
@@ -95,16 +101,10 @@ SELECT * FROM rqt_range(NULL, 1, NULL, '{"max_vertices":"5"}');
 --! rqt_range(): option "max_vertices" must be an integer of 4 or more
 
 -- of the contract, not yet here
-SELECT * FROM rqt_strip(NULL, 1, NULL, '{"mode":"border"}');
---! rqt_strip(): option "mode":"border" is not in this version
-SELECT rqt_mesh(NULL, 1, 'obj', NULL, '{"detail":5}');
---! rqt_mesh(): option "detail" is not in this version
 SELECT * FROM rqt_triangles(NULL, 1, NULL, '{"max_triangles":100}');
 --! rqt_triangles(): option "max_triangles" is not in this version
 SELECT * FROM rqt_range(NULL, 1, NULL, '{"previous":"x"}');
 --! rqt_range(): option "previous" is not in this version
-SELECT * FROM rqt_strip(NULL, 1, NULL, '{"frame":null}');
---! rqt_strip(): option "frame" is not in this version
 SELECT * FROM rqt_verify(NULL, 1, NULL, '{"test":{}}');
 --! rqt_verify(): option "test" is not in this version
 
