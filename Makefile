@@ -16,7 +16,7 @@ INCLUDES = -Isrc/core -Isrc/store -Isrc/geo -Isrc/verify -Isrc/format -Isrc/impo
 
 CORE = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/core/*.c))
 PLAIN = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/verify/*.c src/format/*.c))
-GEO = $(BUILD)/geo/geo.o
+GEO = $(patsubst src/%.cpp,$(BUILD)/%.o,$(wildcard src/geo/*.cpp))
 SQL_SOURCES = $(wildcard src/store/*.c ext/*.c)
 SQL_HOSTED = $(patsubst %.c,$(BUILD)/hosted/%.o,$(SQL_SOURCES))
 SQL_LINKED = $(patsubst %.c,$(BUILD)/linked/%.o,$(SQL_SOURCES))
@@ -25,7 +25,7 @@ CLI = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/cli/*.c))
 GENERATED = $(BUILD)/generated/schema_sql.h
 
 LIBS_CORE = -lzstd -lm
-LIBS_EXT = -lGeographicLib -lcjson $(LIBS_CORE)
+LIBS_EXT = -lGeographicLib -lgeos_c -lproj -lcjson $(LIBS_CORE)
 LIBS_CLI = $(LIBS_EXT) -lsqlite3 $(shell gdal-config --libs 2>/dev/null) $(shell pkg-config --libs cairo libpng 2>/dev/null) -lpthread -lstdc++
 GDAL_CFLAGS = $(shell gdal-config --cflags 2>/dev/null)
 CAIRO_CFLAGS = $(shell pkg-config --cflags cairo libpng 2>/dev/null)
@@ -73,10 +73,10 @@ $(BUILD)/%.o: src/%.c
 $(BUILD)/core/error_kernels.o: WARNINGS += -Wno-psabi
 
 # The SQL that a person can read is the SQL that the program runs.
-$(BUILD)/generated/schema_sql.h: sql/schema.sql sql/terrain.sql sql/geopackage.sql
+$(BUILD)/generated/schema_sql.h: sql/schema.sql sql/terrain.sql sql/fill.sql sql/geopackage.sql
 	@mkdir -p $(@D)
-	@for f in schema terrain geopackage; do \
-	  printf 'static const char sql_%s[] =\n' $$f; \
+	@for f in schema terrain fill geopackage; do \
+	  printf '__attribute__((unused)) static const char sql_%s[] =\n' $$f; \
 	  sed -e '/^--/d' -e 's/\\/\\\\/g' -e 's/"/\\"/g' -e 's/^/    "/' -e 's/$$/\\n"/' sql/$$f.sql; printf '    ;\n'; \
 	done > $@
 
@@ -131,6 +131,12 @@ test-quick: ## the tests without the sanitized build
 	@./src/install-packages.sh build test
 	@$(MAKE) --no-print-directory -j2 products test-programs
 	@BUILD=$(BUILD) ./tests/run.sh quick
+
+.PHONY: test-qgis
+test-qgis: ## install QGIS, and open and draw in it, without a screen, what rqt writes: pictures in build/qgis
+	@./src/install-packages.sh build test qgis
+	@$(MAKE) --no-print-directory -j2 products
+	@RQT=$(BUILD)/rqt RQT_SO=$(BUILD)/rqt.so /usr/bin/python3 tests/qgis/test_qgis.py $(BUILD)/qgis
 
 # The test programs alone, which know the core best: what only a script reaches counts as missed.
 .PHONY: coverage

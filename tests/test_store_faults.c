@@ -109,6 +109,15 @@ static int read_everything(sqlite3 *db, const expected *right, const char **step
         code = store_window(s, t, 3, 2, 4, 3, q, valid, &error);
     }
     if (code == SQLITE_OK) {
+        *step = "normals";
+        rqt_patch_vertex vertices[] = {{.col = 0, .row = 0}, {.col = 4, .row = 4}, {.col = 3, .row = 2}};
+        const rqt_patch patch = {.vertices = vertices, .vertex_count = 3};
+        float *normals = NULL;
+        code = store_normals(s, t, &patch, &normals, &error);
+        if (code == SQLITE_OK && !(normals[2] > 0 && normals[5] > 0 && normals[8] > 0)) code = -1;
+        sqlite3_free(normals);
+    }
+    if (code == SQLITE_OK) {
         *step = "list";
         store_terrain *all;
         int count;

@@ -156,6 +156,14 @@ bool import_database_begin(const import_job *job, int k, int64_t page_cache, imp
     return code == SQLITE_OK || import_database_refuse(job, code, detail);
 }
 
+bool import_database_change(const import_job *job, import_database *d) {
+    struct stat file;
+    *d = (import_database){0};
+    if (stat(job->database, &file)) return import_refuse(job, "%s: %s", job->database, strerror(errno));
+    if (S_ISDIR(file.st_mode)) return import_refuse(job, "%s is a folder and not a database", job->database);
+    return open_file(job, d, false) && run(job, d, "SELECT count(*) FROM sqlite_master; BEGIN IMMEDIATE");
+}
+
 bool import_database_commit(const import_job *job, import_database *d) {
     if (!run(job, d, "COMMIT")) return false;
     d->created = false;
