@@ -2,7 +2,8 @@
  * was or done, sound, and in nobody's way.
  *
  * A child writes; its parent kills it after a random time between nothing and a little more than the whole takes,
- * and looks. RQT_KILLS: how often in all (340: some 200 of imports, 140 of updates; fewer under sanitizers). RQT_SEED: the moments. */
+ * and looks. RQT_KILLS: how often in all (340: some 200 of imports, 140 of updates; fewer under sanitizers).
+ * RQT_SEED: the moments. */
 #include "test_fault_support.h"
 
 #include <signal.h>
