@@ -20,15 +20,17 @@ callers() {
 }
 
 list() {
+    local lacking=0
     echo "| function | fuzzers |"
     echo "|---|---|"
     for name in $(core); do
         by=$(callers "$name")
-        [ -n "$by" ] || { echo "FAILED $name of rqt.h has no fuzzer" >&2; return 1; }
+        [ -n "$by" ] || { echo "FAILED $name of rqt.h has no fuzzer" >&2; lacking=1; }
         echo "| $name | $by |"
     done
     # By the function table, each of them.
     for name in $(sql); do echo "| SQL $name | fuzz_sql |"; done
+    return $lacking
 }
 
 if [ "${1:-}" = write ]; then list; exit; fi

@@ -231,14 +231,30 @@ static inline int write_over(const char *database) {
     return import_many(sources, 1, database, &o);
 }
 
+/* A part of the terrain, in the middle of it, gets other heights. */
+static inline int write_update(const char *database) {
+    const file_path source = path_of("part.tif");
+    const char *sources[] = {source.text};
+    const import_options o = demo_options();
+    import_update_report changed;
+    return import_update(sources, 1, database, &o, false, &changed, message, sizeof message);
+}
+
 static const writer writers[] = {
     {"import into a new database", write_new, NULL},
     {"import that replaces", write_over, "PRAGMA journal_mode = delete"},
     {"import that replaces, WAL", write_over, "PRAGMA journal_mode = wal"},
+    {"update", write_update, "PRAGMA journal_mode = delete"},
+    {"update, WAL", write_update, "PRAGMA journal_mode = wal"},
 };
 
-/* The demo database that a writer finds, and the raster that it reads. */
+/* The demo database that a writer finds, and the rasters that it reads. */
 static inline file_path writer_origin(const writer *w) {
+    static const double place[6] = {-71.375, 0.01, 0, 44.335, 0, -0.01};
+    double part[6 * 5];
+    for (int i = 0; i < 6 * 5; i++) part[i] = 200 + i * i % 17;
+    const raster r = {.name = "part.tif", .width = 6, .height = 5, .type = GDT_Int16, .place = place, .epsg = 4326};
+    write_raster(&r, part);
     demo_raster("second.tif", 7);
     const file_path origin = demo_database("origin.gpkg");
     sqlite3 *db;
