@@ -60,6 +60,26 @@ typedef struct import_report {
 int import_run(const char *const *sources, int count, const char *database, const import_options *options,
                import_report *report, char *message, size_t message_size);
 
+typedef struct import_update_report {
+    char name[64];                       /* of the terrain */
+    int64_t samples;                     /* of the sources that were put in: heights, and voids where they count */
+    int64_t left_out;                    /* samples with data outside the terrain */
+    int64_t changed;                     /* samples of the terrain that are others now */
+    int64_t blocks, summaries, bytes;    /* rows written: with their blocks, their summary alone; bytes */
+    int64_t blocks_read, bytes_read;     /* to find out */
+    int64_t measured, cells;             /* samples and summaries that errors were found by */
+    bool minimal;                        /* minimal errors were computed anew */
+    double seconds_read, seconds_update; /* the sources; the terrain */
+} import_update_report;
+
+/* Put sources into a terrain of a database file, one after the other, in one transaction: each must lie on the
+ * terrain's grid and in its CRS, and its heights must be ones that the terrain's unit can hold. Of the options
+ * count name (the terrain; NULL: the only one), nodata, unit, progress ("reading", "updating", "minimal errors")
+ * and notice. voids: void samples of a source make voids, too; else the terrain keeps what it has there. Returns 0,
+ * or 1 with a sentence in message: the database is then as it was. */
+int import_update(const char *const *sources, int count, const char *database, const import_options *options,
+                  bool voids, import_update_report *report, char *message, size_t message_size);
+
 /* GDAL's version, as text. */
 const char *import_gdal_version(void);
 

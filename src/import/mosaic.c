@@ -14,8 +14,8 @@
 #define SLACK 1e-3 /* cells */
 
 /* One axis of source s against the first: the cell at which s begins. */
-static bool align(const import_job *job, const import_source *first, const import_source *s, bool rows,
-                  int64_t *cell) {
+bool import_mosaic_align(const import_job *job, const import_source *first, const import_source *s, bool rows,
+                         int64_t *cell) {
     double from = rows ? first->placement.y0 : first->placement.x0, to = rows ? s->placement.y0 : s->placement.x0;
     double step = rows ? first->placement.dy : first->placement.dx, own = rows ? s->placement.dy : s->placement.dx;
     int32_t n = rows ? s->height : s->width;
@@ -72,7 +72,8 @@ static bool place(const import_job *job, const import_source *sources, int count
             return import_refuse(job, "%s has no geotransform: it cannot be placed beside %s",
                                  s->placed ? first->path : s->path, s->placed ? s->path : first->path);
         int64_t x = 0, y = 0;
-        if (!align(job, first, s, false, &x) || !align(job, first, s, true, &y)) return false;
+        if (!import_mosaic_align(job, first, s, false, &x) || !import_mosaic_align(job, first, s, true, &y))
+            return false;
         m->column[i] = (int32_t)x;
         m->row[i] = (int32_t)y;
         if (x < west) west = x;

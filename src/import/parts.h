@@ -18,6 +18,7 @@
  *   write.c     all of them into the store, in ascending order of number
  *   database.c  the SQLite file: opened, refused, committed or left as it was
  *   import.c    the whole
+ *   update.c    another way through source.c to quantise.c: sources into a terrain that is there
  *
  * Only sources.c, source.c, crs.c and read.c know GDAL; database.c and write.c only know SQLite and the store.
  */
@@ -425,6 +426,8 @@ bool import_database_probe(const import_job *job, const char *terrain);
 /* Open, create if needed, and begin the transaction. page_cache: the most bytes that SQLite keeps of the database.
  */
 bool import_database_begin(const import_job *job, int k, int64_t page_cache, import_database *database);
+/* Open one that is there, for changes to it: journal and pages stay as they are. Begins the transaction. */
+bool import_database_change(const import_job *job, import_database *database);
 bool import_database_commit(const import_job *job, import_database *database);
 /* Close. Without a commit before, the database is as it was, and a file that we created is gone. */
 void import_database_close(const import_job *job, import_database *database);

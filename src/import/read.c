@@ -275,6 +275,7 @@ bool import_reading_open(const import_job *job, const import_source *sources, in
                               .most_open = import_reading_most_open()};
         r->owner = malloc((size_t)mosaic->lattice.width * (size_t)strip_rows * sizeof *r->owner);
         r->dataset = calloc((size_t)count, sizeof(GDALDatasetH));
+        /* NOLINTNEXTLINE(clang-analyzer-optin.portability.UnixAPI): a source has samples */
         r->rows = malloc(samples * import_kind_bytes(mosaic->kind));
         r->mask = malloc(masked ? masked : 1);
     }

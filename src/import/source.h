@@ -93,6 +93,10 @@ typedef struct import_mosaic {
 
 bool import_mosaic_plan(const import_job *job, const import_source *sources, int count, import_mosaic *mosaic);
 void import_mosaic_free(import_mosaic *mosaic);
+/* The cell of the first source's grid at which another one begins, in x or in y; refused unless it shares the grid.
+ */
+bool import_mosaic_align(const import_job *job, const import_source *first, const import_source *s, bool rows,
+                         int64_t *cell);
 
 /* -------------------------------------------------------------------------------------------------- cover.c -- */
 typedef struct import_window { /* of samples, both ends included */

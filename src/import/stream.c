@@ -89,6 +89,7 @@ typedef struct maker {
 static bool keep_block(void *context, rqt_block_number number, const rqt_summary *summary, const rqt_block *block) {
     maker *m = context;
     size_t size;
+    /* NOLINTNEXTLINE(clang-analyzer-core.NullDereference): every worker has its tools */
     m->failed = rqt_block_encode(m->tools->codec, block, m->w->quantum, m->tools->bytes, &size);
     return m->failed == RQT_OK && import_stage_put(m->w->s->stage, number, summary, m->tools->bytes, size);
 }

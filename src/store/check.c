@@ -17,7 +17,6 @@
 
 #include "cache.h"
 
-#include <math.h>
 #include <string.h>
 
 #define CACHE_BYTES ((size_t)16 << 20)
@@ -642,7 +641,7 @@ int store_check(store *s, const store_terrain *t, bool (*tell_one)(void *context
                 void *context, char **error) {
     check c = {.db = store_connection(s),
                .t = t,
-               .quantum = fabs(rqt_unit_factor(&t->unit)) / t->unit.d,
+               .quantum = store_quantum(t),
                .samples_known = true,
                .min_q = INT32_MAX,
                .max_q = INT32_MIN,

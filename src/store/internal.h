@@ -91,13 +91,32 @@ int store_query_computed(store *s, const store_terrain *t, store_question *quest
 void store_methods_free(store *s);
 /* A row per answer of a query, as its summary has it. query.c */
 int store_begin_reads(const rqt_query *query, store_reads *reads);
-int64_t store_count_selected(const rqt_query *query, const rqt_block *block);
-/* Was sqlite3_interrupt called? *code says how to end. query.c */
-bool store_is_interrupted(store *s, int *code);
+int64_t store_count_selected(const rqt_query *query, rqt_block_number number, const rqt_block *block);
 
 #define STORE_MINIMAL "_minimal" /* suffix of the tables that hold minimal errors */
 /* A writer of those tables, beside a terrain of main that is complete. writer.c */
 int store_writer_beside(sqlite3 *db, const store_terrain *t, store_writer **writer, char **error);
+/* The row of a block in the index, bound to ?1 .. ?9. Does it answer anything? Else it has no row. writer.c */
+bool store_bind_index(sqlite3_stmt *s, const rqt_lattice *lattice, const rqt_block_place *place,
+                      rqt_block_number number, const rqt_summary *summary);
+/* Changes to a terrain of main that is there. amend.c */
+typedef struct store_amender store_amender;
+int store_amend_begin(sqlite3 *db, const store_terrain *t, store_amender **amender, char **error);
+/* Another summary, and other bytes unless NULL, for a block; its row in the index likewise. */
+int store_amend_block(store_amender *a, rqt_block_number number, const rqt_summary *before,
+                      const rqt_summary *after, const uint8_t *bytes, size_t size, char **error);
+/* Samples of a window that are not kept are no longer filled ones (rqt_fill_N, where there is one). */
+int store_amend_filled(store_amender *a, int32_t col, int32_t row, int32_t width, int32_t height,
+                       const uint8_t *state, char **error);
+/* The terrain's row, when all changes are made. */
+int store_amend_terrain(store_amender *a, const rqt_statistics *statistics, const char *source, char **error);
+void store_amend_free(store_amender *a);
+/* The tables of its minimal errors, which are there. */
+int store_drop_minimal(sqlite3 *db, int64_t id, char **error);
+/* |f|/d: metres of a height quantum. terrain.c */
+double store_quantum(const store_terrain *t);
+/* Forget what is kept of a block that has changed. blocks.c */
+void store_forget_block(store *s, const store_terrain *t, rqt_block_number number);
 /* The pyramid over a metric's errors, computed now if need be; valid until the store forgets. methods.c */
 int store_take_pyramid(store *s, const store_terrain *t, rqt_metric metric, rqt_outline outline,
                        const rqt_pyramid **pyramid, char **error);

@@ -176,6 +176,18 @@ static bool put_interval(sqlite3_stmt *s, int at, rqt_interval interval) {
     return answers;
 }
 
+bool store_bind_index(sqlite3_stmt *s, const rqt_lattice *lattice, const rqt_block_place *place,
+                      rqt_block_number number, const rqt_summary *summary) {
+    const int32_t last_x = lattice->width - 1, last_y = lattice->height - 1;
+    sqlite3_bind_int64(s, 1, (sqlite3_int64)number);
+    sqlite3_bind_int(s, 2, place->x);
+    sqlite3_bind_int(s, 3, place->x + place->side < last_x ? place->x + place->side : last_x);
+    sqlite3_bind_int(s, 4, place->y);
+    sqlite3_bind_int(s, 5, place->y + place->side < last_y ? place->y + place->side : last_y);
+    const bool tol = put_interval(s, 6, summary->tol), exact = put_interval(s, 8, summary->exact);
+    return tol || exact;
+}
+
 int store_writer_block(store_writer *w, rqt_block_number number, const rqt_summary *summary, const uint8_t *bytes,
                        size_t size, char **error) {
     rqt_block_place place;
@@ -195,14 +207,7 @@ int store_writer_block(store_writer *w, rqt_block_number number, const rqt_summa
     w->bytes += (int64_t)size + RQT_SUMMARY_BYTES;
 
     s = w->put_index;
-    const int32_t last_x = w->lattice.width - 1, last_y = w->lattice.height - 1;
-    sqlite3_bind_int64(s, 1, (sqlite3_int64)number);
-    sqlite3_bind_int(s, 2, place.x);
-    sqlite3_bind_int(s, 3, place.x + place.side < last_x ? place.x + place.side : last_x);
-    sqlite3_bind_int(s, 4, place.y);
-    sqlite3_bind_int(s, 5, place.y + place.side < last_y ? place.y + place.side : last_y);
-    const bool tol = put_interval(s, 6, summary->tol), exact = put_interval(s, 8, summary->exact);
-    if (!tol && !exact) return SQLITE_OK;
+    if (!store_bind_index(s, &w->lattice, &place, number, summary)) return SQLITE_OK;
     sqlite3_step(s);
     code = sqlite3_reset(s);
     return code == SQLITE_OK ? SQLITE_OK : store_fail_db(error, w->db, code, "writing the index");
