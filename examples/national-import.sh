@@ -73,7 +73,7 @@ show info "$database"
 echo
 if [ "$demo" ] && "$rqt" update --help >/dev/null 2>&1; then
     echo "# The agency sends the missing tile, and the high one as it should be"
-    show update mended "$database"
+    show update mended/*.tif "$database"
     show check "$database"
     echo
 fi

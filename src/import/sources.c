@@ -51,12 +51,16 @@ static bool is_same_file(const char *a, const char *b) {
     return !stat(a, &x) && !stat(b, &y) && x.st_dev == y.st_dev && x.st_ino == y.st_ino;
 }
 
-static bool is_raster(const import_job *job, const char *path) {
-    static const char *const beside[] = {".aux.xml", ".ovr", ".msk", ".hdr", ".rqt-import",
-                                         ".vrt",     ".qpj", ".prj", ".tfw"};
-    for (size_t i = 0; i < sizeof beside / sizeof *beside; i++)
-        if (ends_with(path, beside[i])) return false;
-    if (is_same_file(path, job->database)) return false;
+/* What stands beside rasters, or is of this import. */
+static bool is_beside(const import_job *job, const char *path) {
+    static const char *const ends[] = {".aux.xml", ".ovr", ".msk", ".hdr", ".prj", ".qpj", ".tfw", ".rqt-import"};
+    for (size_t i = 0; i < sizeof ends / sizeof *ends; i++)
+        if (ends_with(path, ends[i])) return true;
+    return is_same_file(path, job->database);
+}
+
+static bool is_raster(const char *path) {
+    if (ends_with(path, ".vrt")) return false;
     return ends_with(path, ".zip") || GDALIdentifyDriverEx(path, GDAL_OF_RASTER, NULL, NULL) != NULL;
 }
 
@@ -76,7 +80,9 @@ static bool walk(const import_job *job, import_paths *p, const char *folder, int
         const bool linked = !lstat(path, &link) && S_ISLNK(link.st_mode);
         if (import_is_folder(path)) {
             if (!linked && depth < MOST_DEPTH) ok = walk(job, p, path, argument, line, depth + 1);
-        } else if (is_raster(job, path)) {
+        } else if (is_beside(job, path)) {
+            /* it speaks when its raster is opened */
+        } else if (is_raster(path)) {
             ok = add(job, p, strdup(path), argument, line, true);
         } else {
             p->passed++;
