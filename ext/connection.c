@@ -45,9 +45,9 @@ void connection_owner(connection *c, bool owned) {
 }
 
 int connection_store(connection *c, store **s, char **error) {
-    /* Arguments are worked out before a call begins, so calls never overlap, unless a table of a terrain is really
-     * a view that calls us back: it would run the very statements that are running. */
-    if (c->busy) return fail(error, "rqt is already at work: a table of the terrain is a view that calls rqt");
+    /* Arguments are worked out before a call begins, so calls never overlap, unless a table of a terrain or
+     * of detail is really a view that calls us back: it would run the very statements that are running. */
+    if (c->busy) return fail(error, "rqt is already at work: a table that it reads is a view that calls rqt");
     if (!c->store) {
         const int code = store_open(c->db, &c->store);
         if (code != SQLITE_OK) return code;

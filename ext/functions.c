@@ -46,19 +46,22 @@ const function rqt_functions[] = {
     {.name = "rqt_range",
      .arguments = MESH,
      .returns = "x, y, z, error, level",
-     .purpose = "The vertices of the mesh of a region, each once. error: the stored saturated error in metres, "
-                "infinite at the "
-                "root's corners; level 0 is the coarsest.",
+     .purpose =
+         "The vertices of the mesh of a region, each once. error: the stored saturated error in metres, "
+         "infinite at the "
+         "root's corners; level 0 is the coarsest. Mode cut: vertices between samples have error 0 and no level. "
+         "gpkg: the vertex as a GeoPackage POINT Z.",
      .example = "SELECT count(*) FROM rqt_range(" SUMMIT ", 10)",
      .fill = fill_range,
-     .hidden = "col, row, q, achieved_eps"},
+     .hidden = "col, row, q, achieved_eps, gpkg"},
     {.name = "rqt_triangles",
      .arguments = MESH,
      .returns = "id, x0, y0, z0, x1, y1, z1, x2, y2, z2",
-     .purpose = "The triangles of the mesh of a region, counter-clockwise seen from above.",
-     .example = "SELECT count(*), max(z0) FROM rqt_triangles(" SUMMIT ", 10)",
+     .purpose = "The triangles of the mesh of a region, counter-clockwise seen from above. gpkg: the triangle as a "
+                "GeoPackage POLYGON Z, for layers; as a result of OGR write +gpkg AS geom.",
+     .example = "SELECT count(*), max(z0) FROM rqt_triangles(" SUMMIT ", 10, NULL, '{\"mode\":\"cut\"}')",
      .fill = fill_triangles,
-     .hidden = "achieved_eps"},
+     .hidden = "achieved_eps, gpkg"},
     {.name = "rqt_strip",
      .arguments = MESH,
      .returns = "seq, x, y, z",
@@ -72,7 +75,9 @@ const function rqt_functions[] = {
      .arguments = "region, eps, format [, terrain [, options]]",
      .returns = "BLOB, TEXT for obj",
      .purpose = "The mesh of a region as a file's bytes; format: strip, indexed, rqt (src/core/FORMAT.md; rqt "
-                "takes about a byte a vertex), obj, ply, wkb, gpkg, spatialite.",
+                "takes about a byte a vertex), obj, ply, wkb, gpkg, spatialite; ply+normals, rqt+normals: with the "
+                "terrain's normal at every vertex, from the full-resolution samples around it. Of mode cut and "
+                "frames only obj, ply, wkb, gpkg, spatialite.",
      .example = "SELECT length(rqt_mesh(" SUMMIT ", 10, 'ply'))",
      .call = call_mesh,
      .least = 3,
@@ -93,11 +98,12 @@ const function rqt_functions[] = {
     {.name = "rqt_verify",
      .arguments = MESH,
      .returns = "samples, vertices, triangles, max_error, rms_error, x, y, t_junctions, overlaps, uncovered, area",
-     .purpose = "Proves the mesh of a region: rasterises its triangles over the full-resolution samples. max_error "
-                "in metres, at "
-                "x, y; uncovered: samples inside the region that the outline promises and no triangle covers; area "
-                "in CRS units "
-                "squared.",
+     .purpose =
+         "Proves the mesh of a region: rasterises its triangles over the full-resolution samples. max_error "
+         "in metres, at "
+         "x, y; uncovered: samples inside the region that the outline promises and no triangle covers; area "
+         "in CRS units "
+         "squared. Mode cut: heights between samples are doubles, so deviations count less 2^-20 of a height step.",
      .example = "SELECT max_error <= 10, t_junctions, overlaps, uncovered FROM rqt_verify(" SUMMIT ", 10)",
      .fill = fill_verify,
      .hidden = "void_touched, twice_area_in_cells, half_cells, achieved_eps"},
@@ -123,10 +129,33 @@ const function rqt_functions[] = {
      .least = 2,
      .most = 4,
      .flags = READS},
+    {.name = "rqt_profile",
+     .arguments = "line, eps [, terrain]",
+     .returns = "distance, x, y, z",
+     .purpose =
+         "The heights of the mesh along a line: a row for its own points and for every edge of the mesh that it "
+         "crosses, in its order; between two rows the mesh is a plane. In degrees the line follows geodesics "
+         "and distance, from its start, is geodesic; else both are straight. Metres. Where there is no mesh, "
+         "rows with z NULL say where the gap begins and ends; before the first place on the mesh and after the "
+         "last there are none.",
+     .example = "SELECT count(*), max(z) FROM rqt_profile('LINESTRING(-71.4 44.2, -71.3033 44.2705)', 10)",
+     .fill = fill_profile},
+    {.name = "rqt_area",
+     .arguments = MESH,
+     .returns = "planimetric, surface, volume",
+     .purpose =
+         "How large a region is on the mesh, voids left out: its area at height 0, the area of its surface, and "
+         "the volume above height 0 (less what is below), in metres. The mesh is cut at the region's border, "
+         "unless options name another mode. In degrees everything is on the terrain's ellipsoid, with heights "
+         "taken as above it; else plane.",
+     .example = "SELECT round(planimetric), surface > planimetric FROM rqt_area(" SUMMIT ", 10)",
+     .fill = fill_area,
+     .hidden = "achieved_eps"},
     {.name = "rqt_bbox",
      .arguments = "x0, y0, x1, y1 [, srid]",
      .returns = "GeoPackage geometry",
-     .purpose = "A rectangle as a region.",
+     .purpose = "A rectangle as a region. With SRID 4326, x0 greater than x1 means across the antimeridian: two "
+                "rectangles.",
      .example = "SELECT count(*) FROM rqt_range(rqt_bbox(-71.4, 44.2, -71.2, 44.3), 20)",
      .call = call_bbox,
      .least = 4,
@@ -135,11 +164,23 @@ const function rqt_functions[] = {
     {.name = "rqt_circle",
      .arguments = "lon, lat, metres",
      .returns = "GeoPackage geometry, SRID 4326",
-     .purpose = "A geodesic circle on WGS 84 as a polygon of 256 points.",
+     .purpose = "A geodesic circle on WGS 84 as a polygon: its sides are off by at most 0.01 % of the radius. "
+                "Longitudes go on beyond 180; over a pole it is the band between its rim and the pole.",
      .example = "SELECT length(" SUMMIT ")",
      .call = call_circle,
      .least = 3,
      .most = 3,
+     .flags = PURE},
+    {.name = "rqt_corridor",
+     .arguments = "line, metres",
+     .returns = "GeoPackage geometry, SRID 4326",
+     .purpose =
+         "All that is within so many metres of a line (lon, lat; its points joined by geodesics) on WGS 84, as "
+         "polygons whose sides are off by at most 0.01 % of that.",
+     .example = "SELECT count(*) FROM rqt_range(rqt_corridor('LINESTRING(-71.4 44.2, -71.3 44.27)', 300), 10)",
+     .call = call_corridor,
+     .least = 2,
+     .most = 2,
      .flags = PURE},
     {.name = "rqt_check",
      .arguments = "[terrain]",

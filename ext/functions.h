@@ -62,31 +62,87 @@ void connection_release(void *c);
 void connection_owner(connection *c, bool owned);
 
 /* -------------------------------------------------------------------------------- requests for a patch */
+/* What happens at the region's border, as DESIGN has it. */
+typedef enum request_mode { REQUEST_COVER, REQUEST_SNAP, REQUEST_BORDER, REQUEST_CUT } request_mode;
+
 /* region, eps, terrain, options, as every mesh function takes them. request.c */
+typedef enum frame_kind { FRAME_CRS, FRAME_ECEF, FRAME_ENU } frame_kind; /* in the order of options.c */
+typedef struct space_frame space_frame;
 typedef struct request {
     connection *connection; /* held while the request lives */
     store *store;
     const store_terrain *terrain;
     rqt_geometry *geometry;
-    rqt_region *region;
+    rqt_region *region; /* mode snap: grown to its squares */
+    request_mode mode;
+    bool mode_given; /* the options name one */
     double eps;
     store_query_options options;
-    bool fans;            /* the strip goes round the centres of blocks */
-    int64_t max_vertices; /* 0: any number */
-    double achieved_eps;  /* of the mesh: eps, or more to keep within max_vertices; known after request_patch */
+    struct cJSON *detail;  /* the option, as it came; NULL: none */
+    struct places *places; /* what it says; detail.c */
+    frame_kind frame_kind; /* where the mesh is drawn */
+    space_frame *frame;    /* NULL for FRAME_CRS; frame.c */
+    bool fans;             /* the strip goes round the centres of blocks */
+    int64_t max_vertices;  /* 0: any number */
+    double achieved_eps;   /* of the mesh: eps, or more to keep within max_vertices; known after request_patch */
 } request;
 
 int request_read(connection *c, sqlite3_value *region, sqlite3_value *eps, sqlite3_value *terrain,
                  sqlite3_value *options, request *out, char **error);
 /* A patch with what the product needs; of strips, the one that the options want. Give it back with store_keep. */
 int request_patch(request *r, rqt_product product, rqt_patch *patch, store_reads *reads, char **error);
-/* The patch in wire format. delta.c */
-int wire_mesh(request *r, uint8_t **bytes, size_t *size, char **error);
+/* Mode cut: that patch clipped to the region, instead. Release with rqt_cut_free. cut.c */
+int request_cut(request *r, rqt_cut *cut, char **error);
+/* SQLITE_OK in any other mode; else a sentence that what is asked for cannot hold the answer. cut.c */
+int request_refuse_cut(const request *r, const char *what, char **error);
+/* The patch in wire format, with normals or without. delta.c */
+int wire_mesh(request *r, bool normals, uint8_t **bytes, size_t *size, char **error);
 void request_free(request *r);
+/* A geometry of the request as a region; `what` it is, for sentences. On a terrain in degrees it is one on every
+ * turn that meets the terrain, for longitudes are the same modulo 360: the geometry gets more members. */
+int request_region(const request *r, rqt_geometry *geometry, const char *what, rqt_region **region, char **error);
+/* The rule of what the options detail and mode want, when terrain and region are known. detail.c */
+int rule_read(request *r, char **error);
+void rule_free(request *r);
+/* The request's eps, or the least of its places' when that is less. */
+double rule_least_eps(const request *r);
+/* Of the coordinates that the answer has: the terrain's, 4978 for geocentric ones, 0 for local ones. */
+int32_t request_srid(const request *r);
+/* What the option frame wants, when all else is known: the rule is given what curvature takes. frame.c */
+int frame_read(request *r, char **error);
+void frame_free(space_frame *f);
+/* Vertices of the patch that are one in space become one; without a frame, or where there are none, nothing
+ * changes.
+ */
+int frame_merge(const space_frame *f, rqt_patch *patch);
+/* x,y,z of each vertex of the patch, to be released with sqlite3_free, also when it fails. */
+int frame_places(const space_frame *f, const rqt_patch *patch, double **xyz, char **error);
+/* The terrain's name and what the coordinates are, a line. */
+const char *frame_title(const space_frame *f);
 /* The terrain that a value names; NULL value: the only one. */
 int request_terrain(store *s, sqlite3_value *name, const store_terrain **terrain, char **error);
+/* A geometry (NULL value: none) in the terrain's coordinates, transformed if need be; `what` names it in sentences.
+ * Release with rqt_geometry_free. geometry.c */
+int request_geometry(connection *c, const store_terrain *t, sqlite3_value *value, const char *what,
+                     rqt_geometry **geometry, char **error);
+/* The same of n bytes of text or of a BLOB. */
+int request_geometry_bytes(connection *c, const store_terrain *t, const void *bytes, size_t n, bool text,
+                           const char *what, rqt_geometry **geometry, char **error);
 /* "what must be a number ...": false and a sentence when the value is none, or NaN. */
 bool request_number(sqlite3_value *value, const char *what, double *number, char **error);
+/* The lines of a geometry (points are lines of one point), for functions that want a line: line i has counts[i]
+ * points of x,y, one line after the other. SQLITE_ERROR for NULL, an empty geometry and polygons. */
+typedef struct line_set {
+    double *xy;
+    size_t *counts;
+    size_t count, points;
+    int32_t srid;
+} line_set;
+/* t: the terrain whose coordinates they are to have; NULL: as they come. lines.c */
+int lines_read(connection *c, const store_terrain *t, sqlite3_value *value, line_set *lines, char **error);
+void lines_free(line_set *lines);
+/* Metres in a unit of a terrain's x and y, where they are no angles; 1 when its CRS does not say. */
+double terrain_metre(const store_terrain *t);
 /* Options of the contract; sentences name what is unknown and what is not in this version. options.c */
 int options_read(const char *json, request *r, char **error);
 
@@ -95,9 +151,11 @@ int fail(char **error, const char *format, ...);
 
 /* The functions themselves, by file. */
 fill_rows fill_range, fill_triangles, fill_strip;                          /* mesh_tables.c */
+fill_rows fill_profile, fill_area;                                         /* profile.c, area.c */
 fill_rows fill_terrains, fill_explain, fill_verify, fill_check, fill_help; /* insight_tables.c, verify_table.c */
-scalar_call call_version, call_build_info, call_bbox, call_circle, call_mesh, call_height; /* scalar.c */
-scalar_call call_block_info, call_block_check, call_block_dump;                            /* block_functions.c */
-scalar_call call_delta;                                                                    /* delta.c */
+scalar_call call_version, call_build_info, call_mesh, call_height;         /* scalar.c */
+scalar_call call_block_info, call_block_check, call_block_dump;            /* block_functions.c */
+scalar_call call_bbox, call_circle, call_corridor;                         /* shapes.c */
+scalar_call call_delta;                                                    /* delta.c */
 
 #endif

@@ -141,7 +141,26 @@ typedef struct explanation {
     int k;
     rqt_placement placement;
     double achieved_eps;
+    bool by_rule; /* detail or mode border: where em is too large, or a vertex is forced, children answer */
 } explanation;
+
+/* Why this block was taken, and how much of it was read. */
+static const char *reason_of(const explanation *e, const store_read *read) {
+    static const char *const reasons[2][5] = {
+        {"answers eps; its centre is selected, so its bytes are walked",
+         "answers eps; it only touches the region, so its index row is enough",
+         "answers eps; nothing is selected inside, so its index row is enough",
+         "answers eps; made in memory, for the metric is not stored, and walked",
+         "answers eps; made in memory, for the metric is not stored; nothing is selected inside"},
+        {"answers every eps and border in its reach; its centre is selected, so its bytes are walked",
+         "answers every eps and border in its reach; it only touches the region, so its index row is enough",
+         "answers every eps and border in its reach; nothing is selected inside, so its index row is enough",
+         "answers every eps and border in its reach; made in memory, for the metric is not stored, and walked",
+         "answers every eps and border in its reach; made in memory, for the metric is not stored; nothing is "
+         "selected inside"}};
+    const int which = read->computed ? (read->needs_bytes ? 3 : 4) : read->needs_bytes ? 0 : read->outside ? 1 : 2;
+    return reasons[e->by_rule][which];
+}
 
 static void release_explanation(void *data) {
     store_reads_free(&((explanation *)data)->reads);
@@ -174,15 +193,7 @@ static void explain_column(void *data, size_t row, int column, sqlite3_context *
         break;
     }
     case 2:
-        if (read->computed)
-            text(result,
-                 read->needs_bytes
-                     ? "answers eps; made in memory, for the metric is not stored, and walked"
-                     : "answers eps; made in memory, for the metric is not stored; nothing is selected inside");
-        else
-            text(result, read->needs_bytes ? "answers eps; its centre is selected, so its bytes are walked"
-                         : read->outside   ? "answers eps; it only touches the region, so its index row is enough"
-                                           : "answers eps; nothing is selected inside, so its index row is enough");
+        text(result, reason_of(e, read));
         break;
     case 3:
         sqlite3_result_int64(result, read->bytes);
@@ -210,7 +221,10 @@ int fill_explain(connection *c, sqlite3_value **arguments, row_set *rows, char *
     code = e ? SQLITE_OK : SQLITE_NOMEM;
     rqt_patch patch = {0};
     if (e) {
-        *e = (explanation){.lattice = r.terrain->lattice, .k = r.terrain->k, .placement = r.terrain->placement};
+        *e = (explanation){.lattice = r.terrain->lattice,
+                           .k = r.terrain->k,
+                           .placement = r.terrain->placement,
+                           .by_rule = r.options.rule != NULL};
         code = request_patch(&r, RQT_PRODUCT_VERTICES, &patch, &e->reads, error);
         e->achieved_eps = r.achieved_eps;
     }

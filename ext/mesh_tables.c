@@ -7,31 +7,66 @@
 
 typedef struct mesh {
     rqt_patch patch;
+    bool is_cut; /* then vertices and triangles are those of `cut`, the strip is in patch all the same */
+    rqt_cut cut;
     format_frame frame;
     double factor; /* rqt_unit_factor */
     store *store;  /* lives as long as the table does */
     double achieved_eps;
+    double *xyz; /* of each vertex, in a frame of its own; NULL: the terrain's CRS */
 } mesh;
 
 static void release(void *data) {
     mesh *m = data;
     store_keep(m->store, &m->patch);
+    sqlite3_free(m->xyz);
+    rqt_cut_free(&m->cut);
     sqlite3_free(m);
 }
 
 /* As format_coordinates says them, but only the one. */
-static void put_coordinate(const mesh *m, uint32_t vertex, int which, sqlite3_context *result) {
-    const rqt_patch_vertex *v = &m->patch.vertices[vertex];
+static double coordinate(const mesh *m, uint32_t vertex, int which) {
     const rqt_placement *at = &m->frame.placement;
     const rqt_unit *unit = &m->frame.unit;
-    double value;
-    if (which == 0)
-        value = at->x0 + v->col * at->dx;
-    else if (which == 1)
-        value = at->y0 + v->row * at->dy;
-    else
-        value = ((double)unit->z0 + (double)v->q / (double)unit->d) * m->factor + unit->offset;
-    sqlite3_result_double(result, value);
+    double col, row, q;
+    if (m->xyz) return m->xyz[3 * (size_t)vertex + (size_t)which];
+    if (m->is_cut) {
+        const rqt_cut_vertex *v = &m->cut.vertices[vertex];
+        col = v->col, row = v->row, q = v->q;
+    } else {
+        const rqt_patch_vertex *v = &m->patch.vertices[vertex];
+        col = v->col, row = v->row, q = v->q;
+    }
+    if (which == 0) return at->x0 + col * at->dx;
+    if (which == 1) return at->y0 + row * at->dy;
+    return ((double)unit->z0 + q / (double)unit->d) * m->factor + unit->offset;
+}
+
+static void put_coordinate(const mesh *m, uint32_t vertex, int which, sqlite3_context *result) {
+    sqlite3_result_double(result, coordinate(m, vertex, which));
+}
+
+/* A vertex as POINT Z, or the three of a triangle as POLYGON Z, in GeoPackage's bytes. */
+static void put_geometry(const mesh *m, const uint32_t *vertices, int count, sqlite3_context *result) {
+    double xyz[3][3];
+    uint8_t bytes[FORMAT_TRIANGLE_BYTES];
+    for (int i = 0; i < 3 * count; i++) xyz[i / 3][i % 3] = coordinate(m, vertices[i / 3], i % 3);
+    const size_t size = count == 1 ? format_point_gpkg(xyz[0], m->frame.srid, bytes)
+                                   : format_triangle_gpkg((const double(*)[3])xyz, m->frame.srid, bytes);
+    sqlite3_result_blob(result, bytes, (int)size, SQLITE_TRANSIENT);
+}
+
+/* The strip of a cut, where a patch has its own. */
+static int make_cut(request *r, rqt_product product, mesh *m, char **error) {
+    m->is_cut = true;
+    const int code = request_cut(r, &m->cut, error);
+    if (code != SQLITE_OK || product != RQT_PRODUCT_STRIP) return code;
+    const rqt_patch triangles = {.triangles = m->cut.triangles, .triangle_count = m->cut.triangle_count};
+    m->patch.allocator = *store_allocator();
+    if (rqt_strip_build(&triangles, store_allocator(), &m->patch.strip, &m->patch.strip_count) != RQT_OK)
+        return SQLITE_NOMEM;
+    m->patch.strip_capacity = m->patch.strip_count;
+    return SQLITE_OK;
 }
 
 /* The mesh of the arguments, not yet as rows. */
@@ -44,11 +79,17 @@ static int make_mesh(connection *c, sqlite3_value **arguments, rqt_product produ
     code = m ? SQLITE_OK : SQLITE_NOMEM;
     if (m) {
         memset(m, 0, sizeof *m);
-        m->frame = (format_frame){.placement = r.terrain->placement, .unit = r.terrain->unit, .eps = r.eps};
+        m->frame =
+            (format_frame){.placement = r.terrain->placement, .unit = r.terrain->unit, .srid = request_srid(&r)};
         m->factor = rqt_unit_factor(&m->frame.unit);
         m->store = r.store;
-        code = request_patch(&r, product, &m->patch, NULL, error);
+        code = r.mode == REQUEST_CUT ? make_cut(&r, product, m, error)
+                                     : request_patch(&r, product, &m->patch, NULL, error);
         m->achieved_eps = r.achieved_eps;
+        if (code == SQLITE_OK && r.frame) {
+            code = frame_merge(r.frame, &m->patch);
+            if (code == SQLITE_OK) code = frame_places(r.frame, &m->patch, &m->xyz, error);
+        }
     }
     request_free(&r);
     if (code != SQLITE_OK) {
@@ -62,8 +103,37 @@ static int make_mesh(connection *c, sqlite3_value **arguments, rqt_product produ
     return SQLITE_OK;
 }
 
+/* A vertex that is no sample of the mesh has no level, and places and heights that are not whole. */
+static void cut_column(const mesh *m, size_t row, int column, sqlite3_context *result) {
+    const rqt_cut_vertex *v = &m->cut.vertices[row];
+    const bool is_sample = v->level >= 0;
+    if (column < 3)
+        put_coordinate(m, (uint32_t)row, column, result);
+    else if (column == 3)
+        sqlite3_result_double(result, rqt_code_metres(v->error));
+    else if (column == 4 && is_sample)
+        sqlite3_result_int(result, v->level);
+    else if (column == 8)
+        sqlite3_result_double(result, m->achieved_eps);
+    else if (column >= 5) {
+        const double value = column == 5 ? v->col : column == 6 ? v->row : v->q;
+        if (is_sample)
+            sqlite3_result_int(result, (int)value);
+        else
+            sqlite3_result_double(result, value);
+    }
+}
+
 static void range_column(void *data, size_t row, int column, sqlite3_context *result) {
     const mesh *m = data;
+    if (column == 9) {
+        put_geometry(m, &(const uint32_t){(uint32_t)row}, 1, result);
+        return;
+    }
+    if (m->is_cut) {
+        cut_column(m, row, column, result);
+        return;
+    }
     const rqt_patch_vertex *v = &m->patch.vertices[row];
     if (column < 3)
         put_coordinate(m, (uint32_t)row, column, result);
@@ -81,7 +151,7 @@ int fill_range(connection *c, sqlite3_value **arguments, row_set *rows, char **e
     mesh *m;
     const int code = make_mesh(c, arguments, RQT_PRODUCT_VERTICES, rows, &m, error);
     if (code != SQLITE_OK) return code;
-    rows->count = m->patch.vertex_count;
+    rows->count = m->is_cut ? m->cut.vertex_count : m->patch.vertex_count;
     rows->column = range_column;
     return SQLITE_OK;
 }
@@ -92,15 +162,20 @@ static void triangles_column(void *data, size_t row, int column, sqlite3_context
         sqlite3_result_int64(result, (sqlite3_int64)row + 1);
     else if (column == 10)
         sqlite3_result_double(result, m->achieved_eps);
-    else
-        put_coordinate(m, m->patch.triangles[3 * row + (size_t)(column - 1) / 3], (column - 1) % 3, result);
+    else {
+        const uint32_t *corners = (m->is_cut ? m->cut.triangles : m->patch.triangles) + 3 * row;
+        if (column == 11)
+            put_geometry(m, corners, 3, result);
+        else
+            put_coordinate(m, corners[(column - 1) / 3], (column - 1) % 3, result);
+    }
 }
 
 int fill_triangles(connection *c, sqlite3_value **arguments, row_set *rows, char **error) {
     mesh *m;
     const int code = make_mesh(c, arguments, RQT_PRODUCT_TRIANGLES, rows, &m, error);
     if (code != SQLITE_OK) return code;
-    rows->count = m->patch.triangle_count;
+    rows->count = m->is_cut ? m->cut.triangle_count : m->patch.triangle_count;
     rows->column = triangles_column;
     return SQLITE_OK;
 }

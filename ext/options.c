@@ -8,21 +8,21 @@
 
 typedef struct choice {
     const char *key;
-    const char *done;    /* values that work, between blanks; "#": an integer of 4 or more */
+    const char *done; /* values that work, between blanks; "#": an integer of 4 or more; "[": detail.c reads it */
     const char *pending; /* values of the contract that are not in this version; "*": any value */
 } choice;
 
 static const choice choices[] = {
-    {"mode", " cover ", " snap border cut "},
-    {"outline", " exact ", " tol "},
+    {"mode", " cover snap border cut ", ""},
+    {"outline", " exact tol ", ""},
     {"metric", " exact minimal local wedgie euclid ", ""},
     {"select", " threshold topdown bottomup ", ""},
     {"strip", " bintree fan ", ""},
-    {"detail", "", "*"},
+    {"detail", "[", ""},
     {"max_vertices", "#", ""},
     {"max_triangles", "", "*"},
     {"previous", "", "*"},
-    {"frame", "", "*"},
+    {"frame", " crs ecef enu ", ""},
     {"test", "", "*"},
 };
 
@@ -55,6 +55,10 @@ static int read_one(const cJSON *item, request *r, char **error) {
         r->max_vertices = (int64_t)n;
         return SQLITE_OK;
     }
+    if (c->done[0] == '[') {
+        r->detail = cJSON_Duplicate(item, true);
+        return r->detail ? SQLITE_OK : SQLITE_NOMEM;
+    }
     if (!cJSON_IsString(item))
         return fail(error, "option \"%s\" must be a text: one of%.*s", c->key, (int)strlen(c->done) - 1, c->done);
     const char *value = item->valuestring;
@@ -63,6 +67,12 @@ static int read_one(const cJSON *item, request *r, char **error) {
         return fail(error, "option \"%s\" has no value \"%s\"; this version knows%.*s", c->key, value,
                     (int)strlen(c->done) - 1, c->done);
     /* The lists above are in the order of the enumerations. */
+    if (strcmp(c->key, "mode") == 0) {
+        r->mode = (request_mode)index_of(c, value);
+        r->mode_given = true;
+    }
+    if (strcmp(c->key, "frame") == 0) r->frame_kind = (frame_kind)index_of(c, value);
+    if (strcmp(c->key, "outline") == 0) r->options.outline = (rqt_outline)index_of(c, value);
     if (strcmp(c->key, "select") == 0) r->options.select = (rqt_select)index_of(c, value);
     if (strcmp(c->key, "metric") == 0) r->options.metric = (rqt_metric)index_of(c, value);
     if (strcmp(c->key, "strip") == 0) r->fans = strcmp(value, "fan") == 0;
@@ -72,6 +82,9 @@ static int read_one(const cJSON *item, request *r, char **error) {
 int options_read(const char *json, request *r, char **error) {
     const char *end = NULL;
     cJSON *root = cJSON_ParseWithOpts(json, &end, true);
+    /* cJSON does not tell bad text from no memory. A second try does, unless there is none for the sentence either.
+     */
+    if (!root) root = cJSON_ParseWithOpts(json, &end, true);
     if (!root) return fail(error, "options are not JSON, from here: %.40s", end ? end : json);
     int code = cJSON_IsObject(root) ? SQLITE_OK : fail(error, "options must be a JSON object");
     for (const cJSON *item = root->child; item && code == SQLITE_OK; item = item->next) {

@@ -26,33 +26,27 @@ int request_terrain(store *s, sqlite3_value *name, const store_terrain **terrain
     return store_find(s, text, terrain, error);
 }
 
-static int read_region(request *r, sqlite3_value *value, char **error) {
-    const int type = value ? sqlite3_value_type(value) : SQLITE_NULL;
-    if (type == SQLITE_INTEGER || type == SQLITE_FLOAT)
-        return fail(error, "region must be WKT text, a geometry or NULL; it is a number");
-    if (type != SQLITE_NULL) {
-        const void *bytes =
-            type == SQLITE_TEXT ? (const void *)sqlite3_value_text(value) : sqlite3_value_blob(value);
-        const size_t n = (size_t)sqlite3_value_bytes(value);
-        if (!bytes && n > 0) return SQLITE_NOMEM;
-        rqt_message why = {""};
-        const rqt_status status =
-            rqt_geometry_parse(bytes ? bytes : "", n, type == SQLITE_TEXT, store_allocator(), &r->geometry, &why);
-        if (status == RQT_NO_MEMORY) return SQLITE_NOMEM;
-        if (status != RQT_OK) return fail(error, "region: %s", why.text);
-        const int32_t srid = rqt_geometry_srid(r->geometry);
-        const store_terrain *t = r->terrain;
-        if (srid != 0 && srid != t->srid && !(srid == 4326 && t->wgs84))
-            return fail(
-                error,
-                "region has SRID %d, terrain %s has SRID %d; transforming between them is not in this version",
-                srid, t->name, t->srid);
-    }
-    const rqt_status status =
-        rqt_region_create(r->geometry, &r->terrain->placement, &r->terrain->lattice, store_allocator(), &r->region);
+int request_region(const request *r, rqt_geometry *geometry, const char *what, rqt_region **region, char **error) {
+    const store_terrain *t = r->terrain;
+    const double first = t->placement.x0, last = first + (t->lattice.width - 1) * t->placement.dx;
+    rqt_status status = RQT_OK;
+    if (geometry && t->lonlat) status = rqt_geometry_repeat(geometry, 360, fmin(first, last), fmax(first, last));
+    if (status == RQT_OK)
+        status = rqt_region_create(geometry, &t->placement, &t->lattice, store_allocator(), region);
     if (status == RQT_OK) return SQLITE_OK;
-    return status == RQT_NO_MEMORY ? SQLITE_NOMEM
-                                   : fail(error, "region cannot be placed on terrain %s", r->terrain->name);
+    return status == RQT_NO_MEMORY ? SQLITE_NOMEM : fail(error, "%s cannot be placed on terrain %s", what, t->name);
+}
+
+static int read_region(request *r, sqlite3_value *value, char **error) {
+    const store_terrain *t = r->terrain;
+    int code = request_geometry(r->connection, t, value, "region", &r->geometry, error);
+    if (code != SQLITE_OK) return code;
+    code = request_region(r, r->geometry, "region", &r->region, error);
+    if (code != SQLITE_OK || r->mode != REQUEST_SNAP) return code;
+    rqt_region *drawn = r->region;
+    const rqt_status status = rqt_region_snap(drawn, &t->lattice, store_allocator(), &r->region);
+    rqt_region_free(drawn);
+    return status == RQT_OK ? SQLITE_OK : SQLITE_NOMEM;
 }
 
 int request_read(connection *c, sqlite3_value *region, sqlite3_value *eps, sqlite3_value *terrain,
@@ -67,10 +61,17 @@ int request_read(connection *c, sqlite3_value *region, sqlite3_value *eps, sqlit
         const char *json = (const char *)sqlite3_value_text(options);
         code = json ? options_read(json, r, error) : SQLITE_NOMEM;
     }
+    if (code == SQLITE_OK && r->mode == REQUEST_CUT && (r->max_vertices > 0 || r->fans))
+        code =
+            fail(error, "option \"%s\" does not go with mode \"cut\"", r->fans ? "strip\":\"fan" : "max_vertices");
+    if (code == SQLITE_OK && r->mode == REQUEST_CUT && r->frame_kind != FRAME_CRS)
+        code = fail(error, "option \"frame\" does not go with mode \"cut\"");
     if (code == SQLITE_OK) code = connection_store(c, &r->store, error);
     if (code == SQLITE_OK) r->connection = c;
     if (code == SQLITE_OK) code = request_terrain(r->store, terrain, &r->terrain, error);
     if (code == SQLITE_OK) code = read_region(r, region, error);
+    if (code == SQLITE_OK) code = rule_read(r, error);
+    if (code == SQLITE_OK) code = frame_read(r, error);
     if (code != SQLITE_OK) request_free(r);
     return code;
 }
@@ -89,7 +90,13 @@ int request_patch(request *r, rqt_product product, rqt_patch *patch, store_reads
     return status == RQT_OK ? SQLITE_OK : SQLITE_NOMEM;
 }
 
+int32_t request_srid(const request *r) {
+    return r->frame_kind == FRAME_CRS ? r->terrain->srid : r->frame_kind == FRAME_ECEF ? 4978 : 0;
+}
+
 void request_free(request *r) {
+    frame_free(r->frame);
+    rule_free(r);
     rqt_region_free(r->region);
     rqt_geometry_free(r->geometry);
     if (r->connection) connection_done(r->connection);

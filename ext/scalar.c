@@ -49,61 +49,6 @@ void call_build_info(sqlite3_context *result, int count, sqlite3_value **argumen
         sqlite3_result_error_nomem(result);
 }
 
-static void result_ring(sqlite3_context *result, const double *xy, int n, int32_t srid) {
-    uint8_t *bytes = NULL;
-    size_t size = 0;
-    if (format_ring_gpkg(xy, n, srid, store_allocator(), &bytes, &size) == RQT_OK)
-        sqlite3_result_blob64(result, bytes, size, sqlite3_free);
-    else
-        sqlite3_result_error_nomem(result);
-}
-
-void call_bbox(sqlite3_context *result, int count, sqlite3_value **arguments) {
-    static const char *const names[] = {"x0", "y0", "x1", "y1", "srid"};
-    double v[5] = {0};
-    char *error = NULL;
-    for (int i = 0; i < count; i++) {
-        if (i == 4 && sqlite3_value_type(arguments[4]) == SQLITE_NULL) continue;
-        if (!request_number(arguments[i], names[i], &v[i], &error) || !isfinite(v[i])) {
-            if (!error) (void)fail(&error, "%s must be finite", names[i]);
-            scalar_error(result, "rqt_bbox", SQLITE_ERROR, error);
-            return;
-        }
-    }
-    if (v[0] > v[2] || v[1] > v[3])
-        (void)fail(&error, "%s is greater than %s: give the lesser corner first", v[0] > v[2] ? "x0" : "y0",
-                   v[0] > v[2] ? "x1" : "y1");
-    else if (v[4] != floor(v[4]) || fabs(v[4]) > INT32_MAX)
-        (void)fail(&error, "srid must be an integer");
-    if (error) {
-        scalar_error(result, "rqt_bbox", SQLITE_ERROR, error);
-        return;
-    }
-    const double ring[8] = {v[0], v[1], v[2], v[1], v[2], v[3], v[0], v[3]};
-    result_ring(result, ring, 4, (int32_t)v[4]);
-}
-
-#define CIRCLE_POINTS 256 /* the polygon's sides sag by 0.0075 % of the radius */
-
-void call_circle(sqlite3_context *result, int count, sqlite3_value **arguments) {
-    static const char *const names[] = {"lon", "lat", "metres"};
-    double v[3];
-    char *error = NULL;
-    for (int i = 0; i < count; i++)
-        if (!request_number(arguments[i], names[i], &v[i], &error)) {
-            scalar_error(result, "rqt_circle", SQLITE_ERROR, error);
-            return;
-        }
-    double ring[2 * CIRCLE_POINTS];
-    char why[256] = "";
-    if (geo_circle(v[0], v[1], v[2], CIRCLE_POINTS, ring, why, sizeof why) == 0) {
-        result_ring(result, ring, CIRCLE_POINTS, 4326);
-        return;
-    }
-    const int code = fail(&error, "%s", why);
-    scalar_error(result, "rqt_circle", code, error);
-}
-
 /* -------------------------------------------------------------------------------------------- rqt_mesh */
 
 static int own_format(const request *r, const rqt_patch *patch, rqt_mesh_kind kind, uint8_t **bytes, size_t *size,
@@ -128,53 +73,158 @@ static int own_format(const request *r, const rqt_patch *patch, rqt_mesh_kind ki
     return code;
 }
 
-static int other_format(const request *r, const rqt_patch *patch, format_kind kind, uint8_t **bytes, size_t *size,
-                        char **error) {
-    const format_frame frame = {.placement = r->terrain->placement,
-                                .unit = r->terrain->unit,
-                                .srid = r->terrain->srid,
-                                .title = r->terrain->name,
-                                .eps = r->achieved_eps};
-    const rqt_status status = format_patch(patch, &frame, kind, store_allocator(), bytes, size);
+static int format_failed(rqt_status status, char **error) {
     if (status == RQT_OK) return SQLITE_OK;
     if (status == RQT_NO_MEMORY) return SQLITE_NOMEM;
     return fail(error, "the mesh is larger than 2 GiB in this format; ask for less or a larger eps");
 }
 
+static void framed_coordinates(const void *context, size_t vertex, double xyz[3]) {
+    memcpy(xyz, (const double *)context + 3 * vertex, 3 * sizeof *xyz);
+}
+
+/* In a frame of its own: geocentric has an SRID, east-north-up has none. */
+static int framed_format(const request *r, rqt_patch *patch, format_kind kind, uint8_t **bytes, size_t *size,
+                         char **error) {
+    double *xyz = NULL;
+    int code = frame_merge(r->frame, patch);
+    if (code == SQLITE_OK) code = frame_places(r->frame, patch, &xyz, error);
+    const format_mesh mesh = {.vertex_count = patch->vertex_count,
+                              .triangle_count = patch->triangle_count,
+                              .triangles = patch->triangles,
+                              .coordinates = framed_coordinates,
+                              .context = xyz,
+                              .srid = request_srid(r),
+                              .title = frame_title(r->frame),
+                              .eps = r->achieved_eps};
+    if (code == SQLITE_OK) code = format_failed(format_write(&mesh, kind, store_allocator(), bytes, size), error);
+    sqlite3_free(xyz);
+    return code;
+}
+
+static int other_format(const request *r, rqt_patch *patch, format_kind kind, const float *normals, uint8_t **bytes,
+                        size_t *size, char **error) {
+    if (r->frame) return framed_format(r, patch, kind, bytes, size, error);
+    const format_frame frame = {.placement = r->terrain->placement,
+                                .unit = r->terrain->unit,
+                                .srid = r->terrain->srid,
+                                .title = r->terrain->name,
+                                .eps = r->achieved_eps,
+                                .normals = normals};
+    return format_failed(format_patch(patch, &frame, kind, store_allocator(), bytes, size), error);
+}
+
+typedef struct cut_source {
+    const rqt_cut *cut;
+    const store_terrain *terrain;
+} cut_source;
+
+/* The one expression of the contract, between samples. */
+static void cut_coordinates(const void *context, size_t vertex, double xyz[3]) {
+    const cut_source *s = context;
+    const rqt_cut_vertex *v = &s->cut->vertices[vertex];
+    const rqt_placement *at = &s->terrain->placement;
+    const rqt_unit *unit = &s->terrain->unit;
+    xyz[0] = at->x0 + v->col * at->dx;
+    xyz[1] = at->y0 + v->row * at->dy;
+    xyz[2] = ((double)unit->z0 + v->q / (double)unit->d) * rqt_unit_factor(unit) + unit->offset;
+}
+
+static int cut_format(request *r, format_kind kind, uint8_t **bytes, size_t *size, char **error) {
+    rqt_cut cut;
+    int code = request_cut(r, &cut, error);
+    if (code != SQLITE_OK) return code;
+    const cut_source source = {&cut, r->terrain};
+    const format_mesh mesh = {.vertex_count = cut.vertex_count,
+                              .triangle_count = cut.triangle_count,
+                              .triangles = cut.triangles,
+                              .coordinates = cut_coordinates,
+                              .context = &source,
+                              .srid = r->terrain->srid,
+                              .title = r->terrain->name,
+                              .eps = r->achieved_eps};
+    code = format_failed(format_write(&mesh, kind, store_allocator(), bytes, size), error);
+    rqt_cut_free(&cut);
+    return code;
+}
+
+/* What argument `format` asks for. */
+typedef struct mesh_format {
+    enum { MESH_STRIP, MESH_INDEXED, MESH_WIRE, MESH_OTHER } family;
+    format_kind kind; /* of MESH_OTHER */
+    bool normals;
+    char name[16]; /* without "+normals"; cut where it is none of ours */
+} mesh_format;
+
+static int read_format(sqlite3_value *value, mesh_format *f, char **error) {
+    static const char *const own[] = {"strip", "indexed", "rqt"};
+    static const char with_normals[] = "+normals";
+    const char *text = sqlite3_value_type(value) == SQLITE_TEXT ? (const char *)sqlite3_value_text(value) : "";
+    if (!text) return SQLITE_NOMEM;
+    const size_t length = strlen(text), suffix = sizeof with_normals - 1;
+    const bool normals = length > suffix && strcmp(text + length - suffix, with_normals) == 0;
+    *f = (mesh_format){MESH_OTHER, FORMAT_OBJ, normals, ""};
+    sqlite3_snprintf(sizeof f->name, f->name, "%.*s", (int)(normals ? length - suffix : length), text);
+    for (int i = 0; i < 3; i++)
+        if (strcmp(f->name, own[i]) == 0) f->family = i;
+    if (strcmp(f->name, "glb") == 0) return fail(error, "format \"%s\" is not in this version", text);
+    if (f->family == MESH_OTHER && !format_from_name(f->name, &f->kind))
+        return fail(error, "unknown format \"%s\"; there are strip indexed rqt obj ply wkb gpkg spatialite", text);
+    if (f->normals && f->family != MESH_WIRE && f->kind != FORMAT_PLY)
+        return fail(error, "format \"%s\" has no normals; ply and rqt have", f->name);
+    return SQLITE_OK;
+}
+
+/* A format that is not the wire's, out of a patch. */
+static int patch_mesh(request *r, const mesh_format *f, uint8_t **bytes, size_t *size, char **error) {
+    rqt_patch patch = {0};
+    float *normals = NULL;
+    int code = store_begin(r->store, error); /* mesh and normals of one state of the database */
+    if (code != SQLITE_OK) return code;
+    code =
+        request_patch(r, f->family == MESH_STRIP ? RQT_PRODUCT_STRIP : RQT_PRODUCT_TRIANGLES, &patch, NULL, error);
+    if (code == SQLITE_OK && f->normals) code = store_normals(r->store, r->terrain, &patch, &normals, error);
+    store_end(r->store);
+    if (code == SQLITE_OK && f->family == MESH_OTHER)
+        code = other_format(r, &patch, f->kind, normals, bytes, size, error);
+    else if (code == SQLITE_OK)
+        code =
+            own_format(r, &patch, f->family == MESH_STRIP ? RQT_MESH_STRIP : RQT_MESH_INDEXED, bytes, size, error);
+    sqlite3_free(normals);
+    store_keep(r->store, &patch);
+    return code;
+}
+
 void call_mesh(sqlite3_context *result, int count, sqlite3_value **arguments) {
-    connection *c = sqlite3_user_data(result);
     char *error = NULL;
     request r = {0};
-    rqt_patch patch = {0};
+    mesh_format f;
     uint8_t *bytes = NULL;
     size_t size = 0;
-    format_kind kind = FORMAT_OBJ;
-    const char *format =
-        sqlite3_value_type(arguments[2]) == SQLITE_TEXT ? (const char *)sqlite3_value_text(arguments[2]) : "";
-    const bool strip = strcmp(format, "strip") == 0, indexed = strcmp(format, "indexed") == 0;
-    const bool wire = strcmp(format, "rqt") == 0;
-    const bool other = !strip && !indexed && !wire && format_from_name(format, &kind);
-    int code = SQLITE_OK;
-    if (strcmp(format, "glb") == 0)
-        code = fail(&error, "format \"%s\" is not in this version", format);
-    else if (!strip && !indexed && !wire && !other)
-        code =
-            fail(&error, "unknown format \"%s\"; there are strip indexed rqt obj ply wkb gpkg spatialite", format);
+    int code = read_format(arguments[2], &f, &error);
     if (code == SQLITE_OK)
-        code = request_read(c, arguments[0], arguments[1], count > 3 ? arguments[3] : NULL,
+        code = request_read(sqlite3_user_data(result), arguments[0], arguments[1], count > 3 ? arguments[3] : NULL,
                             count > 4 ? arguments[4] : NULL, &r, &error);
-    if (code == SQLITE_OK && wire)
-        code = wire_mesh(&r, &bytes, &size, &error);
+    if (code == SQLITE_OK && r.frame && f.family != MESH_OTHER)
+        code =
+            fail(&error, "format \"%s\" holds samples, not points in space: option \"frame\" must be crs", f.name);
+    if (code == SQLITE_OK && r.frame && f.normals)
+        code = fail(&error, "normals are those of the terrain's CRS: option \"frame\" must be crs");
+    if (code == SQLITE_OK && (f.family != MESH_OTHER || f.normals)) {
+        char what[60];
+        sqlite3_snprintf(sizeof what, what, "format \"%s%s\"", f.name, f.normals ? "+normals" : "");
+        code = request_refuse_cut(&r, what, &error);
+    }
+    if (code == SQLITE_OK && f.family == MESH_WIRE)
+        code = wire_mesh(&r, f.normals, &bytes, &size, &error);
+    else if (code == SQLITE_OK && r.mode == REQUEST_CUT)
+        code = cut_format(&r, f.kind, &bytes, &size, &error);
     else if (code == SQLITE_OK)
-        code = request_patch(&r, strip ? RQT_PRODUCT_STRIP : RQT_PRODUCT_TRIANGLES, &patch, NULL, &error);
-    if (code == SQLITE_OK && !wire)
-        code = other ? other_format(&r, &patch, kind, &bytes, &size, &error)
-                     : own_format(&r, &patch, strip ? RQT_MESH_STRIP : RQT_MESH_INDEXED, &bytes, &size, &error);
-    if (r.store) store_keep(r.store, &patch);
+        code = patch_mesh(&r, &f, &bytes, &size, &error);
     request_free(&r);
     if (code != SQLITE_OK)
         scalar_error(result, "rqt_mesh", code, error);
-    else if (kind == FORMAT_OBJ && other)
+    else if (f.family == MESH_OTHER && f.kind == FORMAT_OBJ)
         sqlite3_result_text64(result, (const char *)bytes, size, sqlite3_free, SQLITE_UTF8);
     else
         sqlite3_result_blob64(result, bytes, size, sqlite3_free);

@@ -1,17 +1,10 @@
 /* verify_table.c - rqt_verify: hands the returned triangles and the stored samples to the independent verifier. */
-#include "functions.h"
+#include "promise.h"
 
 #include "verify.h"
 
 #include <math.h>
 #include <string.h>
-
-typedef struct window {
-    int32_t col, row, width, height;
-    int32_t *q;
-    uint8_t *valid;
-    const rqt_region *region;
-} window;
 
 typedef struct proof {
     verify_report report;
@@ -19,31 +12,6 @@ typedef struct proof {
     double x, y;
     double achieved_eps;
 } proof;
-
-static bool is_valid(const window *w, int32_t col, int32_t row) {
-    if (col < w->col || row < w->row || col >= w->col + w->width || row >= w->row + w->height) return false;
-    return w->valid[(size_t)(row - w->row) * (size_t)w->width + (size_t)(col - w->col)] != 0;
-}
-
-/* The outline's promise: a sample inside the region that is a corner of a unit half cell with three valid corners.
- * The window has a margin of one sample, so that all cells around are known. */
-static bool is_promised(void *context, int32_t col, int32_t row) {
-    const window *w = context;
-    if (!is_valid(w, col, row) || !rqt_region_contains(w->region, (rqt_vertex){col, row})) return false;
-    for (int cell = 0; cell < 4; cell++) {
-        const int32_t x = col - (cell & 1), y = row - (cell >> 1); /* the cell's north-west corner */
-        const bool nw = is_valid(w, x, y), ne = is_valid(w, x + 1, y), sw = is_valid(w, x, y + 1),
-                   se = is_valid(w, x + 1, y + 1);
-        const int voids = !nw + !ne + !sw + !se;
-        if (voids == 0) return true;
-        if (voids > 1) continue;
-        /* With one void corner, the half without it survives if that corner is off the diagonal; its three corners
-         * are then all the valid ones, this sample among them. */
-        const bool main_diagonal = ((x + y) & 1) == 0;
-        if (main_diagonal ? nw && se : ne && sw) return true;
-    }
-    return false;
-}
 
 static void column(void *data, size_t row, int n, sqlite3_context *result) {
     (void)row;
@@ -98,81 +66,90 @@ static void column(void *data, size_t row, int n, sqlite3_context *result) {
     }
 }
 
-/* Unit half cells with three valid corners in the window: what the outline `exact` covers, no more and no less. */
-static int64_t count_half_cells(const window *w) {
-    int64_t count = 0;
-    for (int32_t y = w->row; y < w->row + w->height - 1; y++)
-        for (int32_t x = w->col; x < w->col + w->width - 1; x++) {
-            const bool nw = is_valid(w, x, y), ne = is_valid(w, x + 1, y), sw = is_valid(w, x, y + 1),
-                       se = is_valid(w, x + 1, y + 1);
-            const bool main_diagonal = ((x + y) & 1) == 0;
-            if (main_diagonal ? nw && se : ne && sw) count += main_diagonal ? ne + sw : nw + se;
-        }
-    return count;
+static void grow_box(int32_t box[4], double col, double row) {
+    if (col < box[0]) box[0] = (int32_t)floor(col);
+    if (row < box[1]) box[1] = (int32_t)floor(row);
+    if (col > box[2]) box[2] = (int32_t)ceil(col);
+    if (row > box[3]) box[3] = (int32_t)ceil(row);
 }
 
-/* The box of everything that is asked about: region and patch, with a margin of one. */
-static bool find_window(const request *r, const rqt_patch *patch, window *w) {
-    int32_t x0, y0, x1, y1;
-    if (!rqt_region_box(r->region, &x0, &y0, &x1, &y1)) return false;
-    for (size_t i = 0; i < patch->vertex_count; i++) {
-        const rqt_patch_vertex *v = &patch->vertices[i];
-        if (v->col < x0) x0 = v->col;
-        if (v->col > x1) x1 = v->col;
-        if (v->row < y0) y0 = v->row;
-        if (v->row > y1) y1 = v->row;
-    }
-    const rqt_lattice *lattice = &r->terrain->lattice;
-    x0 -= x0 > 0;
-    y0 -= y0 > 0;
-    x1 += x1 < lattice->width - 1;
-    y1 += y1 < lattice->height - 1;
-    *w = (window){.col = x0, .row = y0, .width = x1 - x0 + 1, .height = y1 - y0 + 1, .region = r->region};
-    return true;
-}
+/* The triangles as the verifier takes them, one way or the other. */
+typedef struct evidence {
+    verify_triangle *triangles;
+    verify_free_triangle *free_triangles; /* mode cut */
+    size_t count;
+    int32_t box[4]; /* of region and mesh: west, north, east, south */
+} evidence;
 
-static int prove(request *r, proof *p, char **error) {
+static int take_patch(request *r, evidence *e, char **error) {
     rqt_patch patch;
     int code = request_patch(r, RQT_PRODUCT_TRIANGLES, &patch, NULL, error);
     if (code != SQLITE_OK) return code;
-    p->achieved_eps = r->achieved_eps;
-    window w;
-    if (!find_window(r, &patch, &w)) return SQLITE_OK; /* outside the terrain: nothing is claimed */
-    const sqlite3_uint64 samples = (sqlite3_uint64)w.width * (sqlite3_uint64)w.height;
-    w.q = sqlite3_malloc64(samples * sizeof *w.q);
-    w.valid = sqlite3_malloc64(samples);
-    verify_triangle *triangles = sqlite3_malloc64((patch.triangle_count + 1) * sizeof *triangles);
-    code = w.q && w.valid && triangles ? SQLITE_OK : SQLITE_NOMEM;
-    if (code == SQLITE_OK)
-        code = store_window(r->store, r->terrain, w.col, w.row, w.width, w.height, w.q, w.valid, error);
+    e->count = patch.triangle_count;
+    e->triangles = sqlite3_malloc64((e->count + 1) * sizeof *e->triangles);
+    if (!e->triangles) code = SQLITE_NOMEM;
+    for (size_t i = 0; code == SQLITE_OK && i < 3 * e->count; i++) {
+        const rqt_patch_vertex *v = &patch.vertices[patch.triangles[i]];
+        e->triangles[i / 3].corner[i % 3] = (verify_corner){v->col, v->row, v->q};
+        grow_box(e->box, v->col, v->row);
+    }
+    store_keep(r->store, &patch);
+    return code;
+}
+
+static int take_cut(request *r, evidence *e, char **error) {
+    rqt_cut cut;
+    int code = request_cut(r, &cut, error);
+    if (code != SQLITE_OK) return code;
+    e->count = cut.triangle_count;
+    e->free_triangles = sqlite3_malloc64((e->count + 1) * sizeof *e->free_triangles);
+    if (!e->free_triangles) code = SQLITE_NOMEM;
+    for (size_t i = 0; code == SQLITE_OK && i < 3 * e->count; i++) {
+        const rqt_cut_vertex *v = &cut.vertices[cut.triangles[i]];
+        e->free_triangles[i / 3].corner[i % 3] = (verify_free_corner){v->col, v->row, v->q};
+        grow_box(e->box, v->col, v->row);
+    }
+    rqt_cut_free(&cut);
+    return code;
+}
+
+static int judge(const request *r, const evidence *e, proof *p, char **error) {
+    const store_terrain *t = r->terrain;
+    promise window;
+    const int code = promise_begin(&window, r, e->box, error);
+    verify_status status = VERIFY_OK;
     if (code == SQLITE_OK) {
-        for (size_t i = 0; i < 3 * patch.triangle_count; i++) {
-            const rqt_patch_vertex *v = &patch.vertices[patch.triangles[i]];
-            triangles[i / 3].corner[i % 3] = (verify_corner){v->col, v->row, v->q};
-        }
-        if (rqt_region_is_all(r->region)) p->half_cells = count_half_cells(&w);
-        const store_terrain *t = r->terrain;
-        const verify_samples given = {.col0 = w.col,
-                                      .row0 = w.row,
-                                      .width = w.width,
-                                      .height = w.height,
-                                      .q = w.q,
-                                      .valid = w.valid,
+        if (rqt_region_is_all(r->region)) p->half_cells = promise_half_cells(&window);
+        const verify_samples given = {.col0 = window.col,
+                                      .row0 = window.row,
+                                      .width = window.width,
+                                      .height = window.height,
+                                      .q = window.q,
+                                      .valid = window.valid,
                                       .quantum = fabs(rqt_unit_factor(&t->unit)) / (double)t->unit.d,
                                       .cell_x = t->placement.dx,
                                       .cell_y = t->placement.dy,
-                                      .is_promised = is_promised,
-                                      .context = &w};
-        const verify_status status = verify_mesh(&given, triangles, patch.triangle_count, &p->report);
-        if (status == VERIFY_NO_MEMORY) code = SQLITE_NOMEM;
-        if (status == VERIFY_INVALID) code = fail(error, "the mesh leaves the raster");
+                                      .is_promised = promise_holds,
+                                      .context = &window};
+        status = e->free_triangles ? verify_free_mesh(&given, e->free_triangles, e->count, &p->report)
+                                   : verify_mesh(&given, e->triangles, e->count, &p->report);
         p->x = t->placement.x0 + p->report.worst_col * t->placement.dx;
         p->y = t->placement.y0 + p->report.worst_row * t->placement.dy;
     }
-    sqlite3_free(w.q);
-    sqlite3_free(w.valid);
-    sqlite3_free(triangles);
-    store_keep(r->store, &patch);
+    promise_free(&window);
+    if (status == VERIFY_NO_MEMORY) return SQLITE_NOMEM;
+    return status == VERIFY_INVALID ? fail(error, "the mesh leaves the raster") : code;
+}
+
+static int prove(request *r, proof *p, char **error) {
+    evidence e = {0};
+    /* outside the terrain nothing is claimed */
+    const bool meets = rqt_region_box(r->region, &e.box[0], &e.box[1], &e.box[2], &e.box[3]);
+    int code = r->mode == REQUEST_CUT ? take_cut(r, &e, error) : take_patch(r, &e, error);
+    p->achieved_eps = r->achieved_eps;
+    if (code == SQLITE_OK && meets) code = judge(r, &e, p, error);
+    sqlite3_free(e.triangles);
+    sqlite3_free(e.free_triangles);
     return code;
 }
 

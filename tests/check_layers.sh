@@ -58,7 +58,7 @@ say "$([ -z "$writable" ] && echo true)" "librqt.a has no variable that changes 
 
 exports=$(nm -D --defined-only "$BUILD/rqt.so" | awk '{print $3}' | tr '\n' ' ')
 say "$([ "$exports" = 'sqlite3_rqt_init ' ] && echo true)" "rqt.so exports its entry point only: $exports"
-linked=$(readelf -d "$BUILD/rqt.so" | sed -n 's/.*Shared library: \[\(.*\)\]/\1/p' | grep -E 'gdal|sqlite|proj' | tr '\n' ' ')
+linked=$(readelf -d "$BUILD/rqt.so" | sed -n 's/.*Shared library: \[\(.*\)\]/\1/p' | grep -E 'gdal|sqlite' | tr '\n' ' ')
 say "$([ -z "$linked" ] && echo true)" "rqt.so is linked to neither GDAL nor an SQLite of its own $linked"
 sqlite=$(nm -D -u "$BUILD/rqt.so" | grep -c ' sqlite3_')
 say "$([ "$sqlite" = 0 ] && echo true)" "rqt.so calls SQLite through its host only"

@@ -47,7 +47,7 @@ int oracle_is_valid(const oracle *o, oracle_point lattice) {
 /* ------------------------------------------------------------------------------------------- triangles -- */
 
 /* The two halves of the root square; the hypotenuse is the diagonal from the north-west to the south-east. */
-static oracle_triangle root_half(const oracle *o, int which) {
+oracle_triangle oracle_root_half(const oracle *o, int which) {
     int s = o->side - 1;
     oracle_triangle t = {{{s, 0}, {0, 0}, {s, s}}, 0};
     oracle_triangle u = {{{0, s}, {s, s}, {0, 0}}, 0};
@@ -71,6 +71,12 @@ static oracle_triangle child_of(const oracle_triangle *t, int which) {
     c.corner[2] = which == 0 ? t->corner[1] : t->corner[0];
     c.depth = t->depth + 1;
     return c;
+}
+
+int oracle_children(const oracle_triangle *t, oracle_triangle child[2]) {
+    if (!has_split(t)) return 0;
+    for (int which = 0; which < 2; which++) child[which] = child_of(t, which);
+    return 1;
 }
 
 /* Twice the signed area of (a,b,c). */
@@ -272,7 +278,7 @@ void oracle_create(oracle *o, const oracle_terrain *terrain) {
     o->node = take((size_t)(o->side * o->side), sizeof *o->node);
     for (int n = 0; n < o->side * o->side; n++) mpq_inits(o->node[n].raw, o->node[n].saturated, NULL);
     for (int which = 0; which < 2; which++) {
-        oracle_triangle t = root_half(o, which);
+        oracle_triangle t = oracle_root_half(o, which);
         visit(o, &t);
     }
     for (int n = 0; n < o->side * o->side; n++) {
@@ -413,7 +419,7 @@ static void leaves_below(const oracle *o, const unsigned char *set, const oracle
 
 void oracle_leaves(const oracle *o, const unsigned char *set, oracle_list *list) {
     for (int which = 0; which < 2; which++) {
-        oracle_triangle t = root_half(o, which);
+        oracle_triangle t = oracle_root_half(o, which);
         leaves_below(o, set, &t, list);
     }
 }
@@ -431,7 +437,7 @@ static void units_below(const oracle *o, const oracle_triangle *t, oracle_list *
 
 void oracle_unit_triangles(const oracle *o, oracle_list *list) {
     for (int which = 0; which < 2; which++) {
-        oracle_triangle t = root_half(o, which);
+        oracle_triangle t = oracle_root_half(o, which);
         units_below(o, &t, list);
     }
 }

@@ -87,6 +87,10 @@ void oracle_close(const oracle *o, unsigned char *set);
 
 /* All leaves of the mesh of a closed set that are kept: three valid vertices and an area. Appends. */
 void oracle_leaves(const oracle *o, const unsigned char *set, oracle_list *list);
+/* The two halves of the root square, and the two children of a triangle: 0 when it is a half cell of the lattice.
+ */
+oracle_triangle oracle_root_half(const oracle *o, int which);
+int oracle_children(const oracle_triangle *t, oracle_triangle child[2]);
 /* The finest triangles of the bintree that have an area: the unit half-cells of the raster. Appends. */
 void oracle_unit_triangles(const oracle *o, oracle_list *list);
 void oracle_list_free(oracle_list *list);

@@ -219,6 +219,12 @@ prints "verify: a box, given in any order" "holds" verify t.gpkg --terrain hill 
 cp out box; rqt verify t.gpkg --terrain hill --eps 2 --region 'POLYGON((1200 2200,1400 2200,1400 2400,1200 2400,1200 2200))'
 cmp -s out box; ok "... is the same as its WKT" $?
 prints "verify: a region outside is empty" "empty" verify t.gpkg --terrain hill --eps 2 --region 0,0,1,1
+prints "verify: mode cut" "holds" verify t.gpkg --terrain hill --eps 0,2 --region 'POLYGON((1201.5 2200,1400 2210.25,1333 2400,1201.5 2200))' --mode cut
+prints "verify: mode border" "holds" verify t.gpkg --terrain hill --eps 0,2,1000 --region 'POLYGON((1201.5 2200,1400 2210.25,1333 2400,1201.5 2200))' --mode border
+prints "verify: mode snap" "holds" verify t.gpkg --terrain hill --eps 2 --region 1201,2203,1400,2400 --mode snap
+prints "verify: outline tol" "holds" verify t.gpkg --terrain my.hole-2 --eps 0,3,1000 --outline tol
+refuses "verify: an unknown mode" 2 "there is no such mode; there are" verify t.gpkg --eps 1 --mode x
+refuses "verify: an unknown outline" 2 "there is no such outline" verify t.gpkg --eps 1 --outline x
 prints "verify: rounded heights" "holds" verify u.gpkg --terrain feet --eps 0,1
 
 # ------------------------------------------------------------------------------------------------------------ mesh
@@ -228,9 +234,10 @@ refuses "mesh: no output" 2 "-o is missing" $M --eps 1
 refuses "mesh: .glb is for later" 2 ".glb is not in this version" $M --eps 1 -o a.glb
 refuses "mesh: an unknown ending" 2 "the file ends in" $M --eps 1 -o a.xyz
 refuses "mesh: no ending" 2 "the file ends in" $M --eps 1 -o .obj
-refuses "mesh: --mode cut is for later" 2 "--mode cut is not in this version" $M --eps 1 --mode cut -o a.obj
+refuses "mesh: an unknown outline" 2 "there is no such outline; there are exact and tol" $M --eps 1 --outline x -o a.obj
 refuses "mesh: an unknown mode" 2 "there is no such mode" $M --eps 1 --mode x -o a.obj
 refuses "mesh: a list of eps for a model" 2 "--eps takes one number" $M --eps 1,2 -o a.obj
+refuses "mesh: normals in a file that holds none" 2 "a.obj holds no normals; a .ply does" $M --eps 1 --normals -o a.obj
 refuses "mesh: too narrow" 2 "--width 100" $M --eps 1 --width 100 -o a.png
 refuses "mesh: the database itself" 2 "is the database itself" $M --eps 1 -o ./t.gpkg
 ln -s t.gpkg link.gpkg
@@ -274,6 +281,22 @@ ok "gpkg of nothing is an empty layer" $? "$(cat err)"
 rqt $M --eps 2 --mode cover -o x.obj; cp x.obj first.obj; echo old >x.obj
 rqt $M --eps 2 -o x.obj; cmp -s x.obj first.obj; ok "mesh replaces a file, and gives the same bytes again" $?
 rqt $M --eps 2 -o X.OBJ; [ $status = 0 ] && cmp -s X.OBJ first.obj; ok "mesh: endings in capitals" $?
+triangle='POLYGON((1203.5 2204,1390 2211.5,1290.25 2399,1203.5 2204))'
+want=$(sql t.gpkg "SELECT count(*) FROM rqt_triangles('$triangle', 2, 'hill', '{\"mode\":\"cut\",\"outline\":\"tol\"}')")
+for kind in obj ply gpkg svg png; do
+    rqt $M --eps 2 --region "$triangle" --mode cut --outline tol -o cut.$kind
+    case $kind in
+        obj) got=$(grep -c '^f ' cut.obj) ;;
+        ply) got=$(sed -n 's/^element face //p' <(head -c 600 cut.ply | tr -d '\0')) ;;
+        gpkg) got=$(sqlite3 cut.gpkg 'SELECT count(*) FROM hill') ;;
+        *) got=$want ;;
+    esac
+    [ $status = 0 ] && [ -s cut.$kind ] && [ "$got" = "$want" ] && [ "$want" -gt 20 ]
+    ok "mesh: mode cut as .$kind" $? "$got, not $want; $(cat err)"
+done
+rqt $M --eps 2 --normals -o n.ply
+sqlite3 t.gpkg -cmd ".load $RQT_SO" "SELECT writefile('sql.ply', rqt_mesh(NULL, 2, 'ply+normals', 'hill'))" >/dev/null 2>&1
+[ -s n.ply ] && cmp -s n.ply sql.ply && grep -aq 'property float nz' n.ply; ok "mesh --normals: SQL's bytes, with normals" $? "$(cat err)"
 if command -v gdal_translate >/dev/null; then
     gdal_translate -q -a_srs EPSG:32633 hill.asc utm.tif 2>/dev/null
     rqt import utm.tif utm.gpkg
@@ -321,7 +344,7 @@ for region in 'POINT(1300 2300)' 'LINESTRING(1100 2100,1500 2400)' \
 done
 rqt mesh t.gpkg --terrain my.hole-2 --eps 2,9 -o v.png; [ $status = 0 ]; ok "png with voids" $? "$(cat err)"
 if [ -w /dev/full ]; then
-    "$RQT" info t.gpkg >/dev/full 2>err; [ $? = 1 ] && grep -q 'stdout' err; ok "a full disk under stdout is a failure" $? "$(cat err)"
+    "$RQT" info t.gpkg >/dev/full 2>err; [ $? = 1 ] && grep -q 'stdout' err; ok "F50 a full disk under stdout is a failure" $? "$(cat err)"
 fi
 [ -z "$(ls -A | grep '\.part-')" ]; ok "no temporary file is left" $?
 
@@ -428,7 +451,7 @@ db.execute("BEGIN IMMEDIATE"); open("locked", "w").close(); time.sleep(8)
 PY
 locker=$!
 until [ -e locked ]; do sleep 0.05; done
-refuses "import: a locked database" 1 "locked" import --replace hill.asc t.gpkg
+refuses "F50 import: a locked database" 1 "locked" import --replace hill.asc t.gpkg
 prints "info while another program writes" "hill" info t.gpkg
 kill $locker; wait $locker 2>/dev/null
 
@@ -469,10 +492,10 @@ for moment in 10 40 70 writing; do
                 { [ $status = 0 ] || [ $kind = old ] || [ ! -e k.gpkg ]; } ;;
             KILL) [ $status = 0 ] || [ $status = 137 ] ;;
             esac
-            ok "SIG$signal at $moment, $kind database: status and sentence" $? "$status $(cat stop.err)"
+            ok "F49 SIG$signal at $moment, $kind database: status and sentence" $? "$status $(cat stop.err)"
             rqt info k.gpkg
             ! grep -q '^big' out || [[ $before == *big* ]]; ok "... info shows no half terrain" $? "$(cat out)"
-            is_as_before k.gpkg "$before"; ok "... what was there is there, and sound" $? "expected '$before'; $(ls -l k.gpkg* 2>&1; cat check.out 2>/dev/null)"
+            is_as_before k.gpkg "$before"; ok "F49 ... what was there is there, and sound" $? "expected '$before'; $(ls -l k.gpkg* 2>&1; cat check.out 2>/dev/null)"
         done
     done
 done
@@ -488,7 +511,7 @@ prints "info of a database whose writer was killed rolls back" "my.hole-2" info 
 [ ! -e hot.gpkg-journal ]; ok "... and leaves no journal" $? "$(ls -l hot*)"
 rm -f f.gpkg*; (ulimit -f 2000; "$RQT" import --memory 4000 big.bil f.gpkg >out 2>err)
 [ $? = 1 ] && grep -q 'f.gpkg' err && [ -z "$(ls | grep '^f.gpkg')" ]
-ok "import beyond the limit of file sizes: a sentence, and nothing left" $? "$(cat out err; ls -l f.gpkg* 2>&1)"
+ok "F50 import beyond the limit of file sizes: a sentence, and nothing left" $? "$(cat out err; ls -l f.gpkg* 2>&1)"
 rqt import --name big --replace big.bil k.gpkg; [ $status = 0 ]; ok "importing again works after all that" $? "$(cat err)"
 rqt check k.gpkg; [ $status = 0 ] && grep -q '^big: sound' out; ok "... and is sound" $? "$(cat out err)"
 "$RQT" mesh k.gpkg --terrain big --eps 0 -o stopped.gpkg 2>/dev/null & pid=$!

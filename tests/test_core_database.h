@@ -22,7 +22,8 @@ typedef struct database {
     stored *block;
     size_t count;
     rqt_codec *codec;
-    rqt_block scratch; /* the one block that read_block has room for */
+    rqt_block scratch;    /* the one block that read_block has room for */
+    const rqt_rule *rule; /* of the queries to come; NULL: eps alone */
     const rqt_query *asking;
     size_t reads;
     int corrupt; /* read_block fails */
@@ -88,7 +89,9 @@ static inline const rqt_block *database_read(void *context, rqt_block_number num
         const stored *s = &d->block[n];
         if (s->number != number) continue;
         if (d->corrupt) return NULL;
-        CHECK(rqt_summary_needs_block(&s->summary, d->asking->outline, d->asking->eps),
+        const rqt_answer answer = {number, s->summary};
+        CHECK(d->asking->rule ? rqt_query_selects_inside(d->asking, &answer)
+                              : rqt_summary_needs_block(&s->summary, d->asking->outline, d->asking->eps),
               "block %llu was read though its summary is enough", (unsigned long long)number);
         d->reads++;
         /* valid until the next call only: the block before is gone */
@@ -115,7 +118,11 @@ static inline size_t database_answers(const database *d, const rqt_region *regio
         int32_t right = p->x + p->side < last_x ? p->x + p->side : last_x;
         int32_t bottom = p->y + p->side < last_y ? p->y + p->side : last_y;
         if (p->x > x1 || right < x0 || p->y > y1 || bottom < y0) continue;
-        if (!rqt_summary_answers(&d->block[n].summary, outline, eps)) continue;
+        const rqt_summary *summary = &d->block[n].summary;
+        if (d->rule ? !rqt_rule_is_answered(d->rule, p, summary, outline) ||
+                          rqt_rule_is_answered_above(d->rule, p, summary, outline)
+                    : !rqt_summary_answers(summary, outline, eps))
+            continue;
         answers[count++] = (rqt_answer){d->block[n].number, d->block[n].summary};
     }
     for (size_t n = count; n > 1; n--) {
@@ -136,6 +143,7 @@ static inline rqt_status database_query_as(database *d, const rqt_region *region
                        .k = d->k,
                        .region = region,
                        .eps = eps,
+                       .rule = d->rule,
                        .select = select,
                        .outline = outline,
                        .product = product,

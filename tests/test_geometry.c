@@ -487,6 +487,34 @@ static void test_blobs_are_read_as_written(void **state) {
     }
 }
 
+/* What is handed to others reads back as what it was, byte for byte the same again; empty ones too. */
+static void test_wkb_is_read_back(void **state) {
+    (void)state;
+    for (size_t i = 0; i < sample_count(); i++) {
+        bytes b;
+        const sample *s = sample_at(i, &b);
+        rqt_geometry *g, *again;
+        uint8_t *wkb[2];
+        size_t size[2];
+        assert_int_equal(parse(b.at, b.n, false, &g), RQT_OK);
+        assert_int_equal(rqt_geometry_is_empty(g), s->expected[0] == 0);
+        assert_int_equal(rqt_geometry_wkb(g, &allocator, &wkb[0], &size[0]), RQT_OK);
+        expect_geometry(wkb[0], size[0], false, s->expected, 0);
+        assert_int_equal(parse(wkb[0], size[0], false, &again), RQT_OK);
+        assert_int_equal(rqt_geometry_wkb(again, &allocator, &wkb[1], &size[1]), RQT_OK);
+        assert_int_equal(size[0], size[1]);
+        assert_memory_equal(wkb[0], wkb[1], size[0]);
+        test_heap.fail_at = test_heap.calls + 1;
+        uint8_t *none = (uint8_t *)&b;
+        assert_int_equal(rqt_geometry_wkb(g, &allocator, &none, &size[1]), RQT_NO_MEMORY);
+        assert_null(none);
+        test_heap.fail_at = 0;
+        for (int k = 0; k < 2; k++) heap_resize(&test_heap, wkb[k], 0);
+        rqt_geometry_free(g);
+        rqt_geometry_free(again);
+    }
+}
+
 static void test_blob_errors_say_what_and_where(void **state) {
     (void)state;
     static const struct {
@@ -689,6 +717,7 @@ int main(void) {
         TEST(test_numbers_are_the_nearest_doubles),
         TEST(test_numbers_ignore_the_locale),
         TEST(test_blobs_are_read_as_written),
+        TEST(test_wkb_is_read_back),
         TEST(test_blob_errors_say_what_and_where),
         TEST(test_every_truncation_is_refused),
         TEST(test_no_flipped_byte_does_harm),

@@ -235,7 +235,7 @@ static void a_new_file_is_a_geopackage_and_an_old_one_stays_what_it_is(void **un
     close_terrain(&t);
 }
 
-static void databases_that_cannot_be_written_get_a_sentence(void **unused) {
+static void F50_databases_that_cannot_be_written_get_a_sentence(void **unused) {
     (void)unused;
     import_options o = defaults();
     const char *source = small_raster("a.tif", 1);
@@ -268,7 +268,7 @@ static void databases_that_cannot_be_written_get_a_sentence(void **unused) {
     import_fine(source, file("busy.db"), &o);
 }
 
-static void a_full_disk_leaves_nothing(void **unused) {
+static void F50_a_full_disk_leaves_nothing(void **unused) {
     (void)unused;
     static double values[300 * 300];
     for (size_t s = 0; s < LENGTH(values); s++) values[s] = rint(uniform() * 30000);
@@ -367,7 +367,7 @@ static bool die_at(void *context, const char *stage, double done, int64_t sample
     return true;
 }
 
-static void a_killed_import_leaves_no_terrain_that_looks_whole(void **unused) {
+static void F49_a_killed_import_leaves_no_terrain_that_looks_whole(void **unused) {
     (void)unused;
     static const stopper moments[] = {{.stage = "reading", .calls = 1},
                                       {.stage = "errors", .calls = 1},
@@ -432,10 +432,10 @@ int main(void) {
         TEST(F44_jobs_do_not_change_a_byte),
         TEST(an_existing_terrain_stays_unless_it_is_to_be_replaced),
         TEST(a_new_file_is_a_geopackage_and_an_old_one_stays_what_it_is),
-        TEST(databases_that_cannot_be_written_get_a_sentence),
-        TEST(a_full_disk_leaves_nothing),
+        TEST(F50_databases_that_cannot_be_written_get_a_sentence),
+        TEST(F50_a_full_disk_leaves_nothing),
         TEST(a_stopped_import_leaves_the_database_as_it_was),
-        TEST(a_killed_import_leaves_no_terrain_that_looks_whole),
+        TEST(F49_a_killed_import_leaves_no_terrain_that_looks_whole),
     };
     alarm(300); /* threads that wait for each other for ever are a failure too */
     return cmocka_run_group_tests(tests, begin_all, end_all);

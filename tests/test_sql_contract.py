@@ -16,6 +16,8 @@ TABLES = {  # visible columns, then the arguments
     "rqt_strip": ("seq x y z", MESH),
     "rqt_verify": ("samples vertices triangles max_error rms_error x y t_junctions overlaps uncovered area", MESH),
     "rqt_explain": ("level extent why bytes cached selected", MESH),
+    "rqt_profile": ("distance x y z", ["line", "eps", "terrain"]),
+    "rqt_area": ("planimetric surface volume", MESH),
     "rqt_check": ("severity block message", ["terrain"]),
 }
 SCALARS = {  # argument counts, deterministic
@@ -25,13 +27,14 @@ SCALARS = {  # argument counts, deterministic
     "rqt_height": ([2, 3, 4], False),
     "rqt_bbox": ([4, 5], True),
     "rqt_circle": ([3], True),
+    "rqt_corridor": ([2], True),
     "rqt_delta": ([3, 4], False),
     "rqt_block_info": ([1], True),
     "rqt_block_check": ([1], True),
     "rqt_block_dump": ([1], True),
 }
-LATER = ["rqt_profile", "rqt_area", "rqt_view", "rqt_view_triangles", "rqt_view_strip", "rqt_view_explain",
-         "rqt_view_mesh", "rqt_corridor"]
+LATER = ["rqt_view", "rqt_view_triangles", "rqt_view_strip", "rqt_view_explain",
+         "rqt_view_mesh"]
 DETERMINISTIC, DIRECTONLY, INNOCUOUS = 0x800, 0x80000, 0x200000
 
 db = s.connect()

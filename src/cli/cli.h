@@ -49,6 +49,16 @@ bool cli_number(const char *text, double *value);
 bool cli_integer(const char *text, int64_t low, int64_t high, int64_t *value);
 /* "5" or "1,2,5": numbers >= 0, their count; 0 after a sentence. */
 int cli_eps(const char *text, double eps[CLI_MAX_EPS]);
+/* --mode and --outline, as the SQL functions name them. */
+typedef struct cli_answer_options {
+    const char *mode, *outline; /* NULL: the default */
+    char json[80];
+} cli_answer_options;
+/* CLI_OK, or the exit status after a sentence. */
+int cli_set_mode(cli_answer_options *options, const char *mode);
+int cli_set_outline(cli_answer_options *options, const char *outline);
+/* For the SQL functions; good as long as options are. */
+const char *cli_options_json(cli_answer_options *options);
 /* A region as WKT: four numbers x0,y0,x1,y1 become a polygon, everything else is passed on as it is. NULL after a
  * sentence. Released with free. */
 char *cli_region(const char *text);
@@ -77,7 +87,8 @@ typedef struct cli_proof {
     double x, y;
     int64_t t_junctions, overlaps, uncovered;
 } cli_proof;
-bool cli_verify(sqlite3 *db, const char *region, double eps, const char *terrain, cli_proof *proof);
+bool cli_verify(sqlite3 *db, const char *region, double eps, const char *terrain, const char *options,
+                cli_proof *proof);
 /* Does the proof hold for a tolerance, on a terrain whose heights are rounded by quantum_error? */
 bool cli_proof_holds(const cli_proof *proof, double eps, double quantum_error);
 

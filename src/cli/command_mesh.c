@@ -16,7 +16,7 @@ static const char HELP[] =
     "Usage: rqt mesh DATABASE --eps E [OPTION...] -o FILE\n"
     "\n"
     "The ending of FILE says what it will be:\n"
-    "  .obj .ply       a model: x, y in the terrain's coordinates, z in metres, up\n"
+    "  .obj .ply       a model: x, y in the terrain's coordinates, z in metres, up; .ply is a mesh layer to QGIS\n"
     "  .gpkg           a GeoPackage with a layer of 3D triangles, for QGIS and OGR\n"
     "  .svg .png       a picture: shaded relief and the mesh over it, with its true error; a panel for each eps\n"
     "\n"
@@ -24,8 +24,14 @@ static const char HELP[] =
     "  --eps E         tolerance in metres of height; for pictures a list, too: 5,20,80\n"
     "  --region R      x0,y0,x1,y1 or WKT, in the terrain's coordinates (default: all)\n"
     "  --terrain T     which terrain (default: the only one)\n"
-    "  --mode M        what happens at the region's border; in this version only cover, the default: every\n"
-    "                  triangle that has a part of its inside in the region, whole\n"
+    "  --normals       with the terrain's normal at each vertex, from its full-resolution samples; for .ply\n"
+    "  --mode M        what happens at the region's border: cover, the default: every triangle that has a part of\n"
+    "                  its inside in the region, whole; snap: the same of the region grown to squares of a power "
+    "of\n"
+    "                  two of samples; border: triangles are split along it, down to half cells of the samples; "
+    "cut:\n"
+    "                  triangles are clipped to the region\n"
+    "  --outline O     of voids: exact, the default, or tol: moved by no more than eps * --void-tol of the import\n"
     "  -o, --output F  the file; it is replaced when it exists, and only by a whole one\n"
     "  --width W       width of a picture in pixels, 1200 to 12000 (default 1800)\n"
     "  --help          this text\n"
@@ -41,15 +47,18 @@ static const struct option OPTIONS[] = {
     {"eps", required_argument, NULL, 'e'},     {"region", required_argument, NULL, 'r'},
     {"terrain", required_argument, NULL, 't'}, {"mode", required_argument, NULL, 'm'},
     {"output", required_argument, NULL, 'o'},  {"width", required_argument, NULL, 'w'},
+    {"normals", no_argument, NULL, 'n'},       {"outline", required_argument, NULL, 'O'},
     {"help", no_argument, NULL, 'h'},          {NULL, 0, NULL, 0}};
 
 typedef enum kind { NO_KIND, OBJ, PLY, GPKG, SVG, PNG } kind;
 
 typedef struct request {
     const char *database, *terrain, *region, *output;
+    cli_answer_options answer;
     const char *options; /* of the SQL functions, JSON */
     double eps[CLI_MAX_EPS];
     int count, width;
+    bool normals;
     kind kind;
 } request;
 
@@ -70,22 +79,12 @@ static kind kind_of(const char *path) {
     return NO_KIND;
 }
 
-static int set_mode(const char *mode, request *r) {
-    if (!strcmp(mode, "cover")) {
-        r->options = "{\"mode\":\"cover\"}";
-        return CLI_OK;
-    }
-    if (!strcmp(mode, "snap") || !strcmp(mode, "border") || !strcmp(mode, "cut"))
-        return cli_usage("--mode %s is not in this version", mode);
-    return cli_usage("--mode %s: there is no such mode; this version has cover", mode);
-}
-
 /* The bytes of SQL's rqt_mesh. */
 static int write_bytes(sqlite3 *db, const request *r, const char *region, const cli_output *output) {
     sqlite3_stmt *row = cli_prepare(db, "SELECT rqt_mesh(?1, ?2, ?4, ?3, ?5)");
     if (!row) return CLI_FAILED;
     cli_bind_query(row, region, r->eps[0], r->terrain);
-    sqlite3_bind_text(row, 4, r->kind == OBJ ? "obj" : "ply", -1, SQLITE_STATIC);
+    sqlite3_bind_text(row, 4, r->kind == OBJ ? "obj" : r->normals ? "ply+normals" : "ply", -1, SQLITE_STATIC);
     sqlite3_bind_text(row, 5, r->options, -1, SQLITE_STATIC);
     int status = CLI_FAILED;
     if (sqlite3_step(row) == SQLITE_ROW) {
@@ -129,9 +128,14 @@ static int set_option(request *r, int option) {
         r->terrain = optarg;
         return CLI_OK;
     case 'm':
-        return set_mode(optarg, r);
+        return cli_set_mode(&r->answer, optarg);
+    case 'O':
+        return cli_set_outline(&r->answer, optarg);
     case 'o':
         r->output = optarg;
+        return CLI_OK;
+    case 'n':
+        r->normals = true;
         return CLI_OK;
     case 'w':
         if (!cli_integer(optarg, LEAST_WIDTH, LARGEST_WIDTH, &n))
@@ -154,9 +158,11 @@ static int run(int argc, char **argv) {
     if (argc - optind != 1)
         return argc == optind ? cli_usage("a database is missing") : cli_usage("one database at a time");
     r.database = argv[optind];
+    r.options = cli_options_json(&r.answer);
     if (!r.count) return cli_usage("--eps is missing: the tolerance in metres");
     if (!r.output) return cli_usage("-o is missing: the file to write");
     if ((r.kind = kind_of(r.output)) == NO_KIND) return CLI_USAGE;
+    if (r.normals && r.kind != PLY) return cli_usage("%s holds no normals; a .ply does", r.output);
     if (r.count > 1 && r.kind != SVG && r.kind != PNG)
         return cli_usage("%s holds one mesh, so --eps takes one number here; a list is for .svg and .png",
                          r.output);

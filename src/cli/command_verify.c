@@ -8,7 +8,7 @@
 static const char HELP[] =
     "rqt verify: proves the meshes of a terrain against its samples\n"
     "\n"
-    "Usage: rqt verify DATABASE --eps E [--region R] [--terrain T]\n"
+    "Usage: rqt verify DATABASE --eps E [--region R] [--terrain T] [--mode M] [--outline O]\n"
     "\n"
     "Makes the mesh, lays its triangles over all full-resolution samples with code that knows nothing of how the\n"
     "mesh was made, and reports the true error and every crack. Exit status 1 when a mesh is further than eps "
@@ -19,6 +19,8 @@ static const char HELP[] =
     "  --eps E         tolerance in metres of height, or a list of them: 1,2,5\n"
     "  --region R      x0,y0,x1,y1 or WKT, in the terrain's coordinates (default: all)\n"
     "  --terrain T     which terrain (default: the only one)\n"
+    "  --mode M        at the region's border: cover (default), snap, border or cut, as rqt mesh has it\n"
+    "  --outline O     of voids: exact (default) or tol; uncovered samples are those that it promises to cover\n"
     "  --help          this text\n"
     "\n"
     "Columns: samples covered, vertices and triangles of the mesh, largest and root mean square error in metres,\n"
@@ -32,13 +34,15 @@ static const char HELP[] =
 static const struct option OPTIONS[] = {{"eps", required_argument, NULL, 'e'},
                                         {"region", required_argument, NULL, 'r'},
                                         {"terrain", required_argument, NULL, 't'},
+                                        {"mode", required_argument, NULL, 'm'},
+                                        {"outline", required_argument, NULL, 'O'},
                                         {"help", no_argument, NULL, 'h'},
                                         {NULL, 0, NULL, 0}};
 
 /* The rows are printed when all are there, so that their columns line up. False when a verdict is bad or a query
  * failed. */
 static bool verify(sqlite3 *db, const char *region, const double *eps, int count, const char *name,
-                   const store_terrain *t) {
+                   const char *options, const store_terrain *t) {
     static const char *const heads[] = {"eps",       "samples",   "vertices", "triangles", "share",
                                         "max error", "rms error", "at x",     "at y",      "T-junctions",
                                         "overlaps",  "uncovered", "verdict"};
@@ -47,7 +51,7 @@ static bool verify(sqlite3 *db, const char *region, const double *eps, int count
     cli_table_begin(&table, 13, "rrrrrrrrrrrrl");
     for (int i = 0; i < count; i++) {
         cli_proof proof;
-        answered = cli_verify(db, region, eps[i], name, &proof);
+        answered = cli_verify(db, region, eps[i], name, options, &proof);
         if (!answered) break;
         if (!i) cli_table_add(&table, heads);
         const bool holds = cli_proof_holds(&proof, eps[i], t->quantum_error);
@@ -84,10 +88,13 @@ static bool verify(sqlite3 *db, const char *region, const double *eps, int count
 static int run(int argc, char **argv) {
     const char *terrain = NULL, *region = NULL;
     double eps[CLI_MAX_EPS];
+    cli_answer_options answer = {0};
     int count = 0;
     for (int option; (option = cli_option(argc, argv, "h", OPTIONS)) != -1;) {
         if (option == 'h') return cli_help(HELP);
         if (option == '?') return CLI_USAGE;
+        if (option == 'm' && cli_set_mode(&answer, optarg) != CLI_OK) return CLI_USAGE;
+        if (option == 'O' && cli_set_outline(&answer, optarg) != CLI_OK) return CLI_USAGE;
         if (option == 't') terrain = optarg;
         if (option == 'r') region = optarg;
         if (option == 'e' && !(count = cli_eps(optarg, eps))) return CLI_USAGE;
@@ -102,7 +109,7 @@ static int run(int argc, char **argv) {
     const store_terrain *t;
     sqlite3 *db = cli_open(argv[optind]);
     if (db && cli_find_terrain(db, terrain, &s, &t)) {
-        ok = verify(db, wkt, eps, count, terrain, t);
+        ok = verify(db, wkt, eps, count, terrain, cli_options_json(&answer), t);
         store_close(s);
     }
     sqlite3_close(db);

@@ -103,11 +103,13 @@ bool cli_find_terrain(sqlite3 *db, const char *name, store **s, const store_terr
     return false;
 }
 
-bool cli_verify(sqlite3 *db, const char *region, double eps, const char *terrain, cli_proof *proof) {
+bool cli_verify(sqlite3 *db, const char *region, double eps, const char *terrain, const char *options,
+                cli_proof *proof) {
     sqlite3_stmt *row = cli_prepare(db, "SELECT samples, vertices, triangles, max_error, rms_error, x, y, "
-                                        "t_junctions, overlaps, uncovered FROM rqt_verify(?1, ?2, ?3)");
+                                        "t_junctions, overlaps, uncovered FROM rqt_verify(?1, ?2, ?3, ?4)");
     if (!row) return false;
     cli_bind_query(row, region, eps, terrain);
+    sqlite3_bind_text(row, 4, options, -1, SQLITE_STATIC);
     const int code = sqlite3_step(row);
     if (code == SQLITE_ROW) {
         *proof = (cli_proof){.samples = sqlite3_column_int64(row, 0),

@@ -1,9 +1,11 @@
 /* edges.c - the edges of a mesh, each once, and the part of each pixel that their lines cover.
  *
- * The mesh comes from SQL as 'indexed' bytes. An edge inside the mesh belongs to two triangles; sorting finds the
- * pairs. Coverage is worked out here and not by cairo: a mesh may have millions of edges shorter than a pixel, and
- * a pixel's coverage is the largest that any one line gives it, so that nothing builds up to dots where edges meet.
+ * The mesh comes from SQL as PLY, which holds meshes of every mode. An edge inside the mesh belongs to two
+ * triangles; sorting finds the pairs. Coverage is worked out here and not by cairo: a mesh may have millions of
+ * edges shorter than a pixel, and a pixel's coverage is the largest that any one line gives it, so that nothing
+ * builds up to dots where edges meet.
  */
+#define _GNU_SOURCE /* memmem */
 #include "picture.h"
 
 #include <math.h>
@@ -21,19 +23,53 @@ static int compare_keys(const void *a, const void *b) {
     return (x > y) - (x < y);
 }
 
-static void place_of(const uint8_t *vertices, uint64_t index, int32_t place[2]) {
-    memcpy(place, vertices + 12 * index, 8); /* col, row */
+/* A mesh as PLY, of which only what rqt itself writes is read. */
+typedef struct model {
+    const uint8_t *vertices; /* double x, y, z: 24 bytes each */
+    const uint8_t *faces;    /* 3, and three int: 13 bytes each */
+    uint64_t vertex_count, face_count;
+} model;
+
+static bool read_ply(const char *bytes, size_t size, model *m) {
+    static const char vertex[] = "\nelement vertex ", face[] = "\nelement face ", end[] = "\nend_header\n";
+    const char *body = bytes ? memmem(bytes, size, end, sizeof end - 1) : NULL;
+    if (!body) return false;
+    const size_t head = (size_t)(body - bytes);
+    const char *v = memmem(bytes, head, vertex, sizeof vertex - 1), *f = memmem(bytes, head, face, sizeof face - 1);
+    if (!v || !f) return false;
+    m->vertex_count = strtoull(v + sizeof vertex - 1, NULL, 10); /* lines end before the header does */
+    m->face_count = strtoull(f + sizeof face - 1, NULL, 10);
+    m->vertices = (const uint8_t *)body + sizeof end - 1;
+    m->faces = m->vertices + 24 * m->vertex_count;
+    return m->vertex_count <= INT32_MAX && m->face_count <= INT32_MAX &&
+           head + sizeof end - 1 + 24 * m->vertex_count + 13 * m->face_count == size;
 }
 
-static bool collect(const rqt_mesh_header *header, const uint8_t *vertices, const uint8_t *indices,
-                    picture_mesh *mesh) {
-    const size_t n = (size_t)header->index_count;
+/* In samples. What lies on one is not to be beside it by a rounding: lines would be drawn otherwise. */
+static void place_of(const model *m, const store_terrain *t, uint64_t vertex, double place[2]) {
+    double xy[2];
+    memcpy(xy, m->vertices + 24 * vertex, sizeof xy);
+    place[0] = rint((xy[0] - t->placement.x0) / t->placement.dx * 0x1p20) * 0x1p-20;
+    place[1] = rint((xy[1] - t->placement.y0) / t->placement.dy * 0x1p20) * 0x1p-20;
+}
+
+static void add_edge(picture_mesh *mesh, const double a[2], const double b[2]) {
+    for (int c = 0; c < 2; c++) {
+        const int32_t low = (int32_t)floor(fmin(a[c], b[c])), high = (int32_t)ceil(fmax(a[c], b[c]));
+        if (!mesh->count || low < mesh->box[2 * c]) mesh->box[2 * c] = low;
+        if (!mesh->count || high > mesh->box[2 * c + 1]) mesh->box[2 * c + 1] = high;
+    }
+    mesh->edges[mesh->count++] = (picture_edge){a[0], a[1], b[0], b[1]};
+}
+
+static bool collect(const model *m, const store_terrain *t, picture_mesh *mesh) {
+    const size_t n = 3 * (size_t)m->face_count;
     uint64_t *keys = malloc((n + 1) * sizeof *keys);
     if (!keys) return false;
     for (size_t i = 0; i < n; i++) {
-        uint32_t a, b;
-        memcpy(&a, indices + 4 * i, 4);
-        memcpy(&b, indices + 4 * (i % 3 == 2 ? i - 2 : i + 1), 4);
+        uint32_t corner[3];
+        memcpy(corner, m->faces + 13 * (i / 3) + 1, sizeof corner);
+        const uint32_t a = corner[i % 3], b = corner[(i + 1) % 3];
         keys[i] = a < b ? (uint64_t)a << 32 | b : (uint64_t)b << 32 | a;
     }
     qsort(keys, n, sizeof *keys, compare_keys);
@@ -42,41 +78,32 @@ static bool collect(const rqt_mesh_header *header, const uint8_t *vertices, cons
         if (!i || keys[i] != keys[i - 1]) keys[count++] = keys[i];
     mesh->edges = malloc((count + 1) * sizeof *mesh->edges);
     for (size_t i = 0; mesh->edges && i < count; i++) {
-        int32_t a[2], b[2];
-        place_of(vertices, keys[i] >> 32, a);
-        place_of(vertices, keys[i] & 0xFFFFFFFF, b);
-        mesh->edges[i] = (picture_edge){a[0], a[1], b[0], b[1]};
-        for (int c = 0; c < 2; c++) {
-            const int32_t low = a[c] < b[c] ? a[c] : b[c], high = a[c] < b[c] ? b[c] : a[c];
-            if (!i || low < mesh->box[2 * c]) mesh->box[2 * c] = low;
-            if (!i || high > mesh->box[2 * c + 1]) mesh->box[2 * c + 1] = high;
-        }
+        double a[2], b[2];
+        place_of(m, t, keys[i] >> 32, a);
+        place_of(m, t, keys[i] & 0xFFFFFFFF, b);
+        add_edge(mesh, a, b);
     }
-    mesh->count = count;
     free(keys);
     return mesh->edges != NULL;
 }
 
-bool picture_mesh_read(sqlite3 *db, const char *region, double eps, const char *terrain, const char *options,
-                       picture_mesh *mesh) {
+bool picture_mesh_read(sqlite3 *db, const store_terrain *t, const char *region, double eps, const char *terrain,
+                       const char *options, picture_mesh *mesh) {
     *mesh = (picture_mesh){.eps = eps};
-    if (!cli_verify(db, region, eps, terrain, &mesh->proof)) return false;
-    sqlite3_stmt *row = cli_prepare(db, "SELECT rqt_mesh(?1, ?2, 'indexed', ?3, ?4)");
+    if (!cli_verify(db, region, eps, terrain, options, &mesh->proof)) return false;
+    sqlite3_stmt *row = cli_prepare(db, "SELECT rqt_mesh(?1, ?2, 'ply', ?3, ?4)");
     if (!row) return false;
     cli_bind_query(row, region, eps, terrain);
     sqlite3_bind_text(row, 4, options, -1, SQLITE_STATIC);
     bool ok = sqlite3_step(row) == SQLITE_ROW;
     if (!ok) cli_fail_database(db);
     if (ok) {
-        rqt_mesh_header header;
-        const uint8_t *vertices, *indices;
-        const uint8_t *bytes = sqlite3_column_blob(row, 0);
-        const int size = sqlite3_column_bytes(row, 0);
-        ok = bytes && rqt_mesh_decode(bytes, (size_t)size, &header, &vertices, &indices) == RQT_OK &&
-             header.kind == RQT_MESH_INDEXED;
+        model m;
+        const char *bytes = sqlite3_column_blob(row, 0);
+        ok = read_ply(bytes, (size_t)sqlite3_column_bytes(row, 0), &m);
         if (!ok)
-            cli_fail("the mesh cannot be decoded");
-        else if (!(ok = collect(&header, vertices, indices, mesh)))
+            cli_fail("the mesh cannot be read");
+        else if (!(ok = collect(&m, t, mesh)))
             cli_fail("out of memory");
     }
     sqlite3_finalize(row);

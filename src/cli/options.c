@@ -89,6 +89,36 @@ int cli_eps(const char *text, double eps[CLI_MAX_EPS]) {
     return 0;
 }
 
+static int set_word(const char **field, const char *option, const char *const *words, const char *word) {
+    for (int i = 0; words[i]; i++)
+        if (strcmp(words[i], word) == 0) {
+            *field = words[i];
+            return CLI_OK;
+        }
+    char known[64] = "";
+    for (int i = 0; words[i]; i++) {
+        if (i) strncat(known, words[i + 1] ? ", " : " and ", sizeof known - strlen(known) - 1);
+        strncat(known, words[i], sizeof known - strlen(known) - 1);
+    }
+    return cli_usage("--%s %s: there is no such %s; there are %s", option, word, option, known);
+}
+
+int cli_set_mode(cli_answer_options *options, const char *mode) {
+    static const char *const modes[] = {"cover", "snap", "border", "cut", NULL};
+    return set_word(&options->mode, "mode", modes, mode);
+}
+
+int cli_set_outline(cli_answer_options *options, const char *outline) {
+    static const char *const outlines[] = {"exact", "tol", NULL};
+    return set_word(&options->outline, "outline", outlines, outline);
+}
+
+const char *cli_options_json(cli_answer_options *options) {
+    snprintf(options->json, sizeof options->json, "{\"mode\":\"%s\",\"outline\":\"%s\"}",
+             options->mode ? options->mode : "cover", options->outline ? options->outline : "exact");
+    return options->json;
+}
+
 static char *box_wkt(const double box[4]) {
     static const int corner[] = {0, 1, 2, 1, 2, 3, 0, 3, 0, 1};
     char *wkt = malloc(400), *end = wkt;

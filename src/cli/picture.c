@@ -79,7 +79,8 @@ static bool choose_window(picture_page *page) {
 static bool gather(sqlite3 *db, store *s, picture_page *page, const double *eps, const char *terrain,
                    const char *options, double width, bool svg) {
     for (int i = 0; i < page->count; i++)
-        if (!picture_mesh_read(db, page->region, eps[i], terrain, options, &page->meshes[i])) return false;
+        if (!picture_mesh_read(db, page->terrain, page->region, eps[i], terrain, options, &page->meshes[i]))
+            return false;
     if (!choose_window(page)) return false;
     picture_layout(page, width, svg);
     if (!picture_relief_make(s, page->terrain, &page->window, &page->relief)) return false;

@@ -40,7 +40,7 @@ void picture_tint(double share, double rgb[3]);
 extern const double picture_void_rgb[3];
 
 typedef struct picture_edge {
-    int32_t x0, y0, x1, y1; /* samples from the raster's (0,0) */
+    double x0, y0, x1, y1; /* samples from the raster's (0,0) */
 } picture_edge;
 
 typedef struct picture_mesh {
@@ -54,9 +54,9 @@ typedef struct picture_mesh {
     double line_share;      /* of the full line width, less for dense meshes */
 } picture_mesh;
 
-/* The edges of the answer of rqt_mesh(.., 'indexed', ..). False after a sentence. */
-bool picture_mesh_read(sqlite3 *db, const char *region, double eps, const char *terrain, const char *options,
-                       picture_mesh *mesh);
+/* The edges of the answer of rqt_mesh() over terrain t, which `terrain` names. False after a sentence. */
+bool picture_mesh_read(sqlite3 *db, const store_terrain *t, const char *region, double eps, const char *terrain,
+                       const char *options, picture_mesh *mesh);
 /* Their coverage with lines of `width` pixels, and the opacity that goes with it. */
 bool picture_mesh_cover(picture_mesh *mesh, const picture_window *window, double width);
 

@@ -5,6 +5,8 @@
  * never closed silently: whoever wrote it may have lost more than its last point. Empty members are dropped. */
 #include "geometry.h"
 
+#include <math.h>
+
 static const char *const type_names[GEOMETRY_TYPES] = {
     "GEOMETRY",          "POINT",        "LINESTRING",         "POLYGON",        "MULTIPOINT",
     "MULTILINESTRING",   "MULTIPOLYGON", "GEOMETRYCOLLECTION", "CIRCULARSTRING", "COMPOUNDCURVE",
@@ -135,6 +137,27 @@ rqt_status rqt_geometry_parse(const void *bytes, size_t n, bool text, const rqt_
     return RQT_OK;
 }
 
+rqt_status rqt_geometry_of_lines(const double *xy, const size_t *counts, size_t lines, int32_t srid,
+                                 const rqt_allocator *allocator, rqt_geometry **geometry) {
+    *geometry = NULL;
+    rqt_geometry *g = memory_take(allocator, sizeof *g);
+    if (!g) return RQT_NO_MEMORY;
+    *g = (rqt_geometry){.allocator = *allocator, .srid = srid};
+    rqt_status status = RQT_OK;
+    for (size_t l = 0; l < lines && status == RQT_OK; l++) {
+        if (counts[l] == 0) continue;
+        status = geometry_open_part(g, counts[l] == 1 ? GEOMETRY_POINT : GEOMETRY_LINE, NULL);
+        if (status == RQT_OK) status = geometry_open_ring(g, NULL);
+        for (size_t i = 0; i < counts[l] && status == RQT_OK; i++, xy += 2)
+            status = isfinite(xy[0]) && isfinite(xy[1]) ? geometry_add_point(g, xy[0], xy[1], NULL) : RQT_INVALID;
+    }
+    if (status == RQT_OK)
+        *geometry = g;
+    else
+        rqt_geometry_free(g);
+    return status;
+}
+
 void rqt_geometry_free(rqt_geometry *geometry) {
     if (!geometry) return;
     rqt_allocator a = geometry->allocator;
@@ -146,4 +169,55 @@ void rqt_geometry_free(rqt_geometry *geometry) {
 
 int32_t rqt_geometry_srid(const rqt_geometry *geometry) {
     return geometry->srid;
+}
+
+/* ------------------------------------------------------------------------------------------ lines, and turns */
+
+size_t rqt_geometry_members(const rqt_geometry *geometry) {
+    return geometry->part_count;
+}
+
+const double *rqt_geometry_line(const rqt_geometry *geometry, size_t n, size_t *points) {
+    const geometry_part *part = &geometry->parts[n];
+    *points = 0;
+    if (part->type == GEOMETRY_POLYGON) return NULL;
+    *points = geometry->rings[part->first].count;
+    return &geometry->points[geometry->rings[part->first].first].x;
+}
+
+/* The part once more, moved in x. */
+static rqt_status add_moved(rqt_geometry *g, size_t part, double by) {
+    const geometry_part from = g->parts[part];
+    rqt_status status = geometry_open_part(g, from.type, NULL);
+    for (size_t r = 0; r < from.count && status == RQT_OK; r++) {
+        const geometry_ring ring = g->rings[from.first + r];
+        status = geometry_open_ring(g, NULL);
+        for (size_t i = 0; i < ring.count && status == RQT_OK; i++) {
+            const geometry_point p = g->points[ring.first + i];
+            status = geometry_add_point(g, p.x + by, p.y, NULL);
+        }
+    }
+    return status;
+}
+
+rqt_status rqt_geometry_repeat(rqt_geometry *g, double period, double low, double high) {
+    const size_t parts = g->part_count;
+    for (size_t p = 0; p < parts; p++) {
+        double least = INFINITY, most = -INFINITY;
+        const geometry_part part = g->parts[p];
+        for (size_t r = 0; r < part.count; r++)
+            for (size_t i = 0; i < g->rings[part.first + r].count; i++) {
+                const double x = g->points[g->rings[part.first + r].first + i].x;
+                least = fmin(least, x);
+                most = fmax(most, x);
+            }
+        if (!(least >= -3 * period && most <= 3 * period)) continue;
+        const double first = ceil((low - most) / period), last = floor((high - least) / period);
+        for (double turn = first; turn <= last; turn++) {
+            if (turn == 0) continue; /* the part where it is */
+            const rqt_status status = add_moved(g, p, turn * period);
+            if (status != RQT_OK) return status;
+        }
+    }
+    return RQT_OK;
 }

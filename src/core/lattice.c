@@ -42,6 +42,11 @@ int rqt_vertex_level(const rqt_lattice *lattice, rqt_vertex v) {
     return lattice->K - rqt_vertex_scale(lattice, v);
 }
 
+int rqt_vertex_rank(const rqt_lattice *lattice, rqt_vertex v) {
+    const int scale = rqt_vertex_scale(lattice, v);
+    return 2 * scale + ((v.x >> scale) & (v.y >> scale) & 1);
+}
+
 int rqt_vertex_parents(const rqt_lattice *lattice, rqt_vertex v, rqt_vertex parents[2]) {
     if (lattice_is_corner(lattice, v)) return 0;
     const int scale = rqt_vertex_scale(lattice, v);

@@ -78,7 +78,7 @@ static rqt_found descend(const rqt_query *query, const rqt_block_place *p, const
 rqt_found rqt_query_leaf_at(const rqt_query *query, const rqt_answer *answer, const rqt_block *block, int64_t x,
                             int64_t y, rqt_leaf_corner leaf[3]) {
     rqt_block_place p;
-    if (query->select != RQT_SELECT_THRESHOLD || (block && block->k != query->k) ||
+    if (query->select != RQT_SELECT_THRESHOLD || query->rule || (block && block->k != query->k) ||
         rqt_block_locate(&query->lattice, query->k, answer->number, &p) != RQT_OK)
         return RQT_FOUND_UNSURE;
     if (p.x + p.side >= query->lattice.width || p.y + p.side >= query->lattice.height) return RQT_FOUND_UNSURE;

@@ -221,11 +221,6 @@ bool patch_reserve(walk *w) {
 
 /* --------------------------------------------------------------------------------------- vertices of a block */
 
-static rqt_vertex place_vertex(const walk *w, uint32_t place) {
-    const int32_t v = (int32_t)(place * w->inverse >> 32), u = (int32_t)place - v * w->n;
-    return (rqt_vertex){w->place.x + u * w->place.stride, w->place.y + v * w->place.stride};
-}
-
 /* Look up what is selected on the border: the vertices that the patch holds go into the memo. Blocks come in Morton
  * order, so the neighbours to the east and to the south have not been walked yet, and but for the corners what lies
  * there is new. */

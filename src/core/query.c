@@ -4,16 +4,35 @@
  * looking at anything else, with one exception. Let p be the block's parent and A the block's corner in the middle
  * of a side of p. If A is not selected, the leaf there is the quarter of p on that side, of which the block has the
  * apex (the centre of p, always selected) and one end; the other end is the block's far vertex. Two siblings share
- * that quarter: the first of those present emits it.
+ * that quarter: the first of those present emits it. The sibling answers as a block too: below it nothing is
+ * selected, for its centre depends on A.
+ *
+ * Which block answers where, and why this holds for rules (rqt_rule) as for one eps: rule.c.
  *
  * A block whose bytes are not needed, because nothing inside is selected or because it only touches the region, is
  * not read: its summary says all that there is to say.
  */
 #include "walk.h"
 
+bool rqt_query_selects(const rqt_query *query, rqt_vertex v, rqt_code error, uint8_t flags) {
+    const bool outline = query->outline == RQT_OUTLINE_EXACT && (flags & RQT_OUTLINE);
+    return query->rule ? rqt_rule_selects(query->rule, v, error, outline) : error > query->eps || outline;
+}
+
 static bool is_selected(const walk *w, rqt_vertex v, rqt_code error, uint8_t flags) {
-    if (w->selection) return rqt_selection_has(w->selection, v);
-    return error > w->query->eps || (w->query->outline == RQT_OUTLINE_EXACT && (flags & RQT_OUTLINE));
+    return w->selection ? rqt_selection_has(w->selection, v) : rqt_query_selects(w->query, v, error, flags);
+}
+
+/* summary.c: nothing but the corners is selected where the centre is not. */
+static bool selects_inside(const rqt_query *query, const rqt_block_place *p, const rqt_summary *summary) {
+    const rqt_vertex centre = {p->x + p->side / 2, p->y + p->side / 2};
+    return query->k > 0 && rqt_query_selects(query, centre, summary->center_error, summary->center_flags);
+}
+
+bool rqt_query_selects_inside(const rqt_query *query, const rqt_answer *answer) {
+    rqt_block_place place;
+    return rqt_block_locate(&query->lattice, query->k, answer->number, &place) != RQT_OK ||
+           selects_inside(query, &place, &answer->summary);
 }
 
 /* How the closed cell of a block, as far as there are samples, lies to the region. */
@@ -24,7 +43,7 @@ static rqt_relation block_relation(const rqt_query *query, const rqt_block_place
 
 bool rqt_query_needs_block(const rqt_query *query, const rqt_answer *answer) {
     rqt_block_place place;
-    if (!rqt_summary_needs_block(&answer->summary, query->outline, query->eps)) return false;
+    if (!rqt_query_selects_inside(query, answer)) return false;
     if (query->select != RQT_SELECT_THRESHOLD) return true;
     return rqt_block_locate(&query->lattice, query->k, answer->number, &place) != RQT_OK ||
            block_relation(query, &place) != RQT_OUTSIDE;
@@ -153,7 +172,7 @@ static rqt_status close_selection(walk *w) {
         status = rqt_block_locate(&query->lattice, query->k, answer->number, &place);
         if (status != RQT_OK) break;
         const rqt_block *block = NULL;
-        if (rqt_summary_needs_block(&answer->summary, query->outline, query->eps)) {
+        if (selects_inside(query, &place, &answer->summary)) {
             block = query->read_block(query->context, answer->number);
             if (!block) status = RQT_READ_FAILED;
         }
@@ -192,7 +211,7 @@ static rqt_status run_block(walk *w, const rqt_answer *answer) {
                   side = 1 << query->lattice.K;
     const bool outside = block_relation(query, p) == RQT_OUTSIDE;
     w->block = NULL;
-    if (!outside && rqt_summary_needs_block(&answer->summary, query->outline, query->eps)) {
+    if (!outside && selects_inside(query, p, &answer->summary)) {
         w->block = query->read_block(query->context, answer->number);
         if (!w->block) return RQT_READ_FAILED;
         if (w->block->k != query->k) return RQT_CORRUPT;

@@ -16,8 +16,8 @@
  * Lists of more than a few pieces, and the list of polygons, have a tree over their boxes, all in one array. Pieces
  * keep the order of their rings, whose neighbours are near. A question costs O(log n + hits) for borders that do
  * not fold to and fro; nothing is written after rqt_region_create, so any number of threads may ask. */
+#include "cut.h"
 #include "geometry.h"
-#include "region_edges.h"
 
 #include <math.h>
 
@@ -42,14 +42,6 @@ struct rqt_region {
 };
 
 /* --------------------------------------------------------------------------------------------- compile -- */
-static int64_t to_units(double v, double origin, double step) {
-    double samples = (v - origin) / step;
-    double units = samples * (double)REGION_UNIT; /* a power of two: exact, or infinite */
-    if (units >= (double)REGION_LIMIT) return REGION_LIMIT;
-    if (units <= -(double)REGION_LIMIT) return -REGION_LIMIT;
-    return (int64_t)rint(units);
-}
-
 /* What compiling one part after the other needs. */
 typedef struct compiler {
     const rqt_geometry *geometry;
@@ -62,7 +54,7 @@ typedef struct compiler {
 static region_point place_point(const compiler *c, size_t point) {
     geometry_point p = c->geometry->points[point];
     const rqt_placement *at = &c->placement;
-    return (region_point){to_units(p.x, at->x0, at->dx), to_units(p.y, at->y0, at->dy)};
+    return (region_point){region_units(p.x, at->x0, at->dx), region_units(p.y, at->y0, at->dy)};
 }
 
 /* The edges of a part's rings, from the first to before ring `end`. A lone point is an edge to itself. */
@@ -257,13 +249,24 @@ bool rqt_region_box(const rqt_region *region, int32_t *x0, int32_t *y0, int32_t 
     return true;
 }
 
+/* The sign of region_side of a finer point. With b - a = d it is that of floor's side * 2^bits + d x (x, y), whose
+ * last term is split at 2^bits too: so no number is larger than the first. */
+static int side_of_fine(const region_piece *piece, const region_fine_point *p) {
+    const __int128 below = (__int128)(piece->b.x - piece->a.x) * p->y - (__int128)(piece->b.y - piece->a.y) * p->x;
+    const __int128 carry = below >> p->bits; /* rounded down */
+    const __int128 whole = region_side(piece->a, piece->b, p->floor) + carry;
+    if (whole != 0) return whole > 0 ? 1 : -1;
+    return below - carry * ((__int128)1 << p->bits) > 0;
+}
+
 /* The parity of a point that lies on no piece: how many pieces a ray to the left or right crosses, whichever side
  * of the polygon is nearer. A piece counts from its upper end, with, to its lower end, without; so the ray may pass
  * through corners. */
-static bool is_inside(const rqt_region *region, const region_polygon *polygon, region_point p) {
+static bool is_inside_fine(const rqt_region *region, const region_polygon *polygon, const region_fine_point *fine) {
     const region_box *box = &polygon->box;
+    const region_point p = fine->floor; /* what is below its unit changes nothing but the side of a piece */
     if (p.x < box->x0 || p.x > box->x1 || p.y < box->y0 || p.y > box->y1) return false;
-    if (polygon->is_box) return true;
+    if (polygon->is_box) return (p.x < box->x1 || fine->x == 0) && (p.y < box->y1 || fine->y == 0);
     bool left = p.x - box->x0 < box->x1 - p.x, odd = false;
     region_box ray = {left ? box->x0 : p.x, p.y, left ? p.x : box->x1, p.y};
     region_search s;
@@ -272,11 +275,16 @@ static bool is_inside(const rqt_region *region, const region_polygon *polygon, r
         const region_piece *piece = &region->border.items[polygon->first + i];
         bool a_above = piece->a.y <= p.y, b_above = piece->b.y <= p.y;
         if (a_above == b_above) continue;
-        __int128 side = region_side(piece->a, piece->b, p);
+        const int side = side_of_fine(piece, fine);
         bool is_right = a_above ? side > 0 : side < 0; /* of p is the piece */
         if (is_right != left) odd = !odd;
     }
     return odd;
+}
+
+static bool is_inside(const rqt_region *region, const region_polygon *polygon, region_point p) {
+    const region_fine_point fine = {.floor = p};
+    return is_inside_fine(region, polygon, &fine);
 }
 
 static bool polygon_meets(const rqt_region *region, const region_polygon *polygon, const region_triangle *t) {
@@ -290,19 +298,34 @@ static bool polygon_meets(const rqt_region *region, const region_polygon *polygo
     return is_inside(region, polygon, t->inner);
 }
 
+static bool polygons_meet(const rqt_region *region, const region_triangle *t) {
+    region_search s;
+    region_search_begin(&s, region->nodes, region->polygon_count, &t->box);
+    for (size_t i; region_search_next(&s, &i);)
+        if (polygon_meets(region, &region->polygons[i], t)) return true;
+    return false;
+}
+
+bool region_area_meets(const rqt_region *region, rqt_vertex a, rqt_vertex b, rqt_vertex c) {
+    if (region->all) return true;
+    region_triangle t;
+    return region_triangle_init(&t, a, b, c) && polygons_meet(region, &t);
+}
+
+bool region_thin_touches(const rqt_region *region, const region_triangle *t) {
+    region_search s;
+    region_search_begin(&s, region->nodes + region->thin_tree, region->thin.count, &t->box);
+    for (size_t i; region_search_next(&s, &i);)
+        if (region_triangle_is_touched(t, &region->thin.items[i])) return true;
+    return false;
+}
+
 bool rqt_region_meets(const rqt_region *region, rqt_vertex a, rqt_vertex b, rqt_vertex c) {
     if (region->all) return true;
     region_triangle t;
     if (!region_triangle_init(&t, a, b, c)) return false;
     if (!region->has_box || !region_boxes_touch(&t.box, &region->box)) return false;
-    region_search s;
-    region_search_begin(&s, region->nodes, region->polygon_count, &t.box);
-    for (size_t i; region_search_next(&s, &i);)
-        if (polygon_meets(region, &region->polygons[i], &t)) return true;
-    region_search_begin(&s, region->nodes + region->thin_tree, region->thin.count, &t.box);
-    for (size_t i; region_search_next(&s, &i);)
-        if (region_triangle_is_touched(&t, &region->thin.items[i])) return true;
-    return false;
+    return polygons_meet(region, &t) || region_thin_touches(region, &t);
 }
 
 static rqt_relation polygon_relation(const rqt_region *region, const region_polygon *polygon,
@@ -317,24 +340,82 @@ static rqt_relation polygon_relation(const rqt_region *region, const region_poly
     return is_inside(region, polygon, centre) ? RQT_INSIDE : RQT_OUTSIDE;
 }
 
-rqt_relation rqt_region_box_relation(const rqt_region *region, int32_t x0, int32_t y0, int32_t x1, int32_t y1) {
-    if (region->all) return RQT_INSIDE;
-    if (x0 >= x1 || y0 >= y1) return RQT_OUTSIDE; /* no triangle in it has an area */
-    region_box box = {x0 * REGION_UNIT, y0 * REGION_UNIT, x1 * REGION_UNIT, y1 * REGION_UNIT};
-    if (!region->has_box || !region_boxes_touch(&box, &region->box)) return RQT_OUTSIDE;
+static bool box_of_samples(const rqt_region *region, int32_t x0, int32_t y0, int32_t x1, int32_t y1,
+                           region_box *box) {
+    *box = (region_box){x0 * REGION_UNIT, y0 * REGION_UNIT, x1 * REGION_UNIT, y1 * REGION_UNIT};
+    return region->has_box && region_boxes_touch(box, &region->box);
+}
+
+static rqt_relation area_relation(const rqt_region *region, const region_box *box) {
     rqt_relation relation = RQT_OUTSIDE;
     region_search s;
-    region_search_begin(&s, region->nodes, region->polygon_count, &box);
+    region_search_begin(&s, region->nodes, region->polygon_count, box);
     for (size_t i; region_search_next(&s, &i);) {
-        rqt_relation one = polygon_relation(region, &region->polygons[i], &box);
+        rqt_relation one = polygon_relation(region, &region->polygons[i], box);
         if (one == RQT_INSIDE) return RQT_INSIDE;
         if (one == RQT_ACROSS) relation = RQT_ACROSS;
     }
-    if (relation == RQT_ACROSS) return relation;
-    region_search_begin(&s, region->nodes + region->thin_tree, region->thin.count, &box);
+    return relation;
+}
+
+static bool thin_touches(const rqt_region *region, const region_box *box) {
+    region_search s;
+    region_search_begin(&s, region->nodes + region->thin_tree, region->thin.count, box);
     for (size_t i; region_search_next(&s, &i);)
-        if (region_box_is_touched(&box, &region->thin.items[i])) return RQT_ACROSS;
-    return RQT_OUTSIDE;
+        if (region_box_is_touched(box, &region->thin.items[i])) return true;
+    return false;
+}
+
+rqt_relation region_area_relation(const rqt_region *region, int32_t x0, int32_t y0, int32_t x1, int32_t y1) {
+    region_box box;
+    if (region->all) return RQT_INSIDE;
+    if (x0 >= x1 || y0 >= y1 || !box_of_samples(region, x0, y0, x1, y1, &box)) return RQT_OUTSIDE;
+    return area_relation(region, &box);
+}
+
+rqt_relation rqt_region_box_relation(const rqt_region *region, int32_t x0, int32_t y0, int32_t x1, int32_t y1) {
+    region_box box;
+    if (region->all) return RQT_INSIDE;
+    if (x0 >= x1 || y0 >= y1) return RQT_OUTSIDE; /* no triangle in it has an area */
+    if (!box_of_samples(region, x0, y0, x1, y1, &box)) return RQT_OUTSIDE;
+    const rqt_relation relation = area_relation(region, &box);
+    return relation == RQT_OUTSIDE && thin_touches(region, &box) ? RQT_ACROSS : relation;
+}
+
+static bool polygon_touches(const rqt_region *region, const region_polygon *polygon, const region_box *box) {
+    if (polygon->is_box) return true; /* found by its box */
+    region_search s;
+    region_search_begin(&s, region->nodes + polygon->tree, polygon->count, box);
+    for (size_t i; region_search_next(&s, &i);)
+        if (region_box_is_touched(box, &region->border.items[polygon->first + i])) return true;
+    const region_point any = {box->x0,
+                              box->y0}; /* there is no border in the box: all of it is inside, or nothing */
+    return is_inside(region, polygon, any);
+}
+
+bool region_touches(const rqt_region *region, const region_box *box) {
+    if (region->all) return true;
+    if (!region->has_box || !region_boxes_touch(box, &region->box)) return false;
+    region_search s;
+    region_search_begin(&s, region->nodes, region->polygon_count, box);
+    for (size_t i; region_search_next(&s, &i);)
+        if (polygon_touches(region, &region->polygons[i], box)) return true;
+    return thin_touches(region, box);
+}
+
+bool region_extent(const rqt_region *region, region_box *box) {
+    *box = region->all ? (region_box){-REGION_LIMIT, -REGION_LIMIT, REGION_LIMIT, REGION_LIMIT} : region->box;
+    return region->all || region->has_box;
+}
+
+void rqt_region_grow_rectangle(rqt_region *region) {
+    if (region->all || region->polygon_count != 1 || region->thin.count > 0 || !region->polygons[0].is_box) return;
+    region_box *box = &region->polygons[0].box;
+    box->x0 = floor_sample(box->x0) * REGION_UNIT;
+    box->y0 = floor_sample(box->y0) * REGION_UNIT;
+    box->x1 = -floor_sample(-box->x1) * REGION_UNIT;
+    box->y1 = -floor_sample(-box->y1) * REGION_UNIT;
+    region->nodes[0] = region->box = *box;
 }
 
 bool rqt_region_contains(const rqt_region *region, rqt_vertex sample) {
@@ -355,4 +436,48 @@ bool rqt_region_contains(const rqt_region *region, rqt_vertex sample) {
         if (!on_border && is_inside(region, polygon, p)) return true;
     }
     return false;
+}
+
+/* ------------------------------------------------------------------------------------- what mode `cut` asks -- */
+bool region_holds(const rqt_region *region, const region_fine_point *p) {
+    const region_box place = {p->floor.x, p->floor.y, p->floor.x, p->floor.y};
+    region_search s;
+    region_search_begin(&s, region->nodes, region->polygon_count, &place);
+    for (size_t i; region_search_next(&s, &i);)
+        if (is_inside_fine(region, &region->polygons[i], p)) return true;
+    return false;
+}
+
+void region_border_begin(region_border_search *s, const rqt_region *region, const region_box *box) {
+    *s = (region_border_search){.region = region, .box = *box, .side = 4};
+    region_search_begin(&s->polygons, region->nodes, region->polygon_count, box);
+}
+
+bool region_border_next(region_border_search *s, region_piece *piece) {
+    for (;;) {
+        size_t i;
+        if (s->is_open && region_search_next(&s->pieces, &i)) {
+            *piece = s->region->border.items[s->first + i];
+            return true;
+        }
+        s->is_open = false;
+        while (s->side < 4) { /* of a rectangle, which keeps no pieces; ends as odd pieces have them */
+            const region_box *r = &s->rectangle;
+            const int n = s->side++;
+            *piece = (region_piece){{n == 3 ? r->x1 : r->x0, n == 1 ? r->y1 : r->y0},
+                                    {n == 2 ? r->x0 : r->x1, n == 0 ? r->y0 : r->y1}};
+            const region_box box = region_piece_box(piece);
+            if (region_boxes_touch(&box, &s->box)) return true;
+        }
+        if (!region_search_next(&s->polygons, &i)) return false;
+        const region_polygon *polygon = &s->region->polygons[i];
+        if (polygon->is_box) {
+            s->rectangle = polygon->box;
+            s->side = 0;
+        } else {
+            s->first = polygon->first;
+            region_search_begin(&s->pieces, s->region->nodes + polygon->tree, polygon->count, &s->box);
+            s->is_open = true;
+        }
+    }
 }

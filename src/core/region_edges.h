@@ -8,6 +8,8 @@
 
 #include "internal.h"
 
+#include <math.h>
+
 #define REGION_UNIT ((int64_t)1 << 20) /* of a sample */
 #define REGION_LIMIT ((int64_t)1 << 60)
 
@@ -22,6 +24,15 @@ typedef struct region_box { /* closed; empty when x0 > x1 */
 typedef struct region_piece { /* a closed segment; a point when both ends are equal */
     region_point a, b;
 } region_piece;
+
+/* A coordinate in units from the first sample. */
+static inline int64_t region_units(double v, double origin, double step) {
+    double samples = (v - origin) / step;
+    double units = samples * (double)REGION_UNIT; /* a power of two: exact, or infinite */
+    if (units >= (double)REGION_LIMIT) return REGION_LIMIT;
+    if (units <= -(double)REGION_LIMIT) return -REGION_LIMIT;
+    return (int64_t)rint(units);
+}
 
 static inline region_box region_piece_box(const region_piece *p) {
     bool right = p->a.x <= p->b.x, down = p->a.y <= p->b.y;
@@ -105,5 +116,15 @@ void region_tree_build(region_box *nodes, size_t count);
 /* Search a built tree for boxes that touch `box`; next gives the number of one after the other. */
 void region_search_begin(region_search *s, const region_box *nodes, size_t count, const region_box *box);
 bool region_search_next(region_search *s, size_t *item);
+
+/* ------------------------------------------------------------------------------------------- region.c --
+ * What rules ask of a region beside the questions of rqt.h. */
+/* A box around all of it; false when it is empty. */
+bool region_extent(const rqt_region *region, region_box *box);
+/* Does the closed region share a point with the closed box? A polygon is the closure of its interior. */
+bool region_touches(const rqt_region *region, const region_box *box);
+/* rqt_region_box_relation and rqt_region_meets for the members with an area alone. */
+rqt_relation region_area_relation(const rqt_region *region, int32_t x0, int32_t y0, int32_t x1, int32_t y1);
+bool region_area_meets(const rqt_region *region, rqt_vertex a, rqt_vertex b, rqt_vertex c);
 
 #endif

@@ -83,6 +83,10 @@ rqt_status rqt_lattice_init(rqt_lattice *lattice, int64_t width, int64_t height)
 int rqt_vertex_scale(const rqt_lattice *lattice, rqt_vertex v);
 /* The level of a vertex: 0 for the corners, K for the finest ([RQT] section 3). */
 int rqt_vertex_level(const rqt_lattice *lattice, rqt_vertex v);
+#define RQT_RANKS (2 * RQT_MAX_K + 2)
+/* 2 * scale for vertices on the sides of cells, 2 * scale + 1 for centres of cells and for the corners: the parents
+ * of a vertex have higher ranks than it. */
+int rqt_vertex_rank(const rqt_lattice *lattice, rqt_vertex v);
 /* The vertices that v depends on, at most two; returns their number: 0 for corners, 1 for a midpoint of the
  * root's border, 2 otherwise. */
 int rqt_vertex_parents(const rqt_lattice *lattice, rqt_vertex v, rqt_vertex parents[2]);
@@ -491,9 +495,25 @@ typedef struct rqt_region rqt_region;
  * RQT_UNSUPPORTED for curves and surfaces. An EMPTY geometry is valid and meets nothing. */
 rqt_status rqt_geometry_parse(const void *bytes, size_t n, bool text, const rqt_allocator *allocator,
                               rqt_geometry **geometry, rqt_message *message);
+/* Lines of counts[i] points x,y, one line after the other; a line of one point is a point. RQT_INVALID when a
+ * coordinate is not finite. */
+rqt_status rqt_geometry_of_lines(const double *xy, const size_t *counts, size_t lines, int32_t srid,
+                                 const rqt_allocator *allocator, rqt_geometry **geometry);
 void rqt_geometry_free(rqt_geometry *geometry);
 /* 0 when the geometry names none (GeoPackage's 0 and -1 count as none). */
 int32_t rqt_geometry_srid(const rqt_geometry *geometry);
+/* How many members it has; and the coordinates x,y of member n with the number of its points, if it is a line or a
+ * point: NULL when it is a polygon. */
+size_t rqt_geometry_members(const rqt_geometry *geometry);
+const double *rqt_geometry_line(const rqt_geometry *geometry, size_t n, size_t *points);
+/* Adds to every member its copies at each multiple of `period` that, added to its x, puts its box on [low, high]:
+ * longitudes are the same modulo 360. A member with coordinates beyond three periods gets none. */
+rqt_status rqt_geometry_repeat(rqt_geometry *geometry, double period, double low, double high);
+bool rqt_geometry_is_empty(const rqt_geometry *geometry);
+/* As well-known binary, x and y only: one member as what it is, several as a collection. *bytes is released with
+ * allocator->resize(context, bytes, 0). */
+rqt_status rqt_geometry_wkb(const rqt_geometry *geometry, const rqt_allocator *allocator, uint8_t **bytes,
+                            size_t *size);
 
 /* Where the samples of a terrain lie: sample (col,row) is at (x0 + col*dx, y0 + row*dy). dx, dy finite, not 0. */
 typedef struct rqt_placement {
@@ -518,12 +538,66 @@ typedef enum rqt_relation {
 /* How the closed box of samples [x0,x1] x [y0,y1] lies to the region. May answer RQT_ACROSS where a closer look
  * would tell more, never the other way. */
 rqt_relation rqt_region_box_relation(const rqt_region *region, int32_t x0, int32_t y0, int32_t x1, int32_t y1);
+/* Mode `border`: a region that is one axis-parallel rectangle grows outward to sample lines. Others stay. */
+void rqt_region_grow_rectangle(rqt_region *region);
 /* Mode `cover`: does the triangle (sample coordinates, any winding, with an area) belong to the region? For a
  * member with an area: interior meets interior. For lines and points, and polygons that the rounding collapsed:
  * the closed triangle meets it. Exact. */
 bool rqt_region_meets(const rqt_region *region, rqt_vertex a, rqt_vertex b, rqt_vertex c);
+/* Mode `snap`: the union of all squares of a grid that the region meets, clipped to the raster: a square belongs
+ * when its interior meets the interior of a member with an area, or when a line or point touches it. The grid is
+ * anchored at sample (0,0); its side is the largest power of two of samples that is not above an eighth of the
+ * longer side of the region's box (rqt_region_box), at least 1: so no region has more than 18 squares a side.
+ * Everything stays everything. */
+rqt_status rqt_region_snap(const rqt_region *region, const rqt_lattice *lattice, const rqt_allocator *allocator,
+                           rqt_region **snapped);
+int32_t rqt_region_snap_side(const rqt_region *region);
 /* Is the sample in the interior of a member with an area? */
 bool rqt_region_contains(const rqt_region *region, rqt_vertex sample);
+
+/* --------------------------------------------------------------------------------------------- rules --
+ * Selection where one eps is not enough: an eps of its own for places, an eps that falls with the size of
+ * triangles, vertices that must be there. A vertex P is selected iff
+ *
+ *     e_sat(P) > threshold(P), or P is forced or an ancestor of a forced vertex, or (outline exact) it has the bit
+ * x threshold(P) = the code of the least eps - lowering(rank of P), eps: that of the rule and those of all places
+ *                    whose closed region meets the closed box of P; -1 where that is below 0
+ *     box(P)       = the square around P of half-width 3q for the centre of a cell of side 2q, else 2q, where q is
+ * the largest power of two that divides both coordinates; it may reach past the raster
+ *
+ * which is a closed set: rule.c has the proof. No valid sample of a kept leaf is further off than eps -
+ * lowering(rank of the leaf's split vertex) for the least eps of all places that hold the sample, nor than the
+ * rule's own. One rule gives one mesh: answers of any regions are parts of it. */
+typedef struct rqt_rule rqt_rule;
+
+typedef struct rqt_rule_place {
+    const rqt_region *region; /* must outlive the rule; an empty one is nowhere */
+    double eps;               /* metres, not NaN, >= 0 */
+} rqt_rule_place;
+
+/* A rule of eps 0 for all vertices: set what is different. quantum_error as in rqt_code_eps, metres. */
+rqt_status rqt_rule_create(const rqt_lattice *lattice, double quantum_error, const rqt_allocator *allocator,
+                           rqt_rule **rule);
+void rqt_rule_free(rqt_rule *rule);
+/* eps where no place says less: metres, not NaN, >= 0 (else RQT_INVALID). Cheap. */
+rqt_status rqt_rule_set_eps(rqt_rule *rule, double eps);
+/* What is taken from every eps, by rank: metres, finite, >= 0, and not less for a higher rank (else RQT_INVALID).
+ */
+rqt_status rqt_rule_set_lowering(rqt_rule *rule, const double metres[RQT_RANKS]);
+/* Instead of the places there were. Thousands are quick: there is a tree over their boxes. */
+rqt_status rqt_rule_set_places(rqt_rule *rule, const rqt_rule_place *places, size_t n);
+/* Force a vertex, and with it all that it depends on. */
+rqt_status rqt_rule_force(rqt_rule *rule, rqt_vertex v);
+/* Mode `border`: force whatever makes the border of R' a union of edges, where R' is the union of the unit half
+ * cells whose interior meets that of R, the members of the region with an area. The leaves that meet R then tile
+ * R'. See border.c. is_interrupted may be NULL; RQT_INTERRUPTED: some are forced, and the rule is of no use. */
+rqt_status rqt_rule_force_border(rqt_rule *rule, const rqt_region *region, bool (*is_interrupted)(void *context),
+                                 void *context);
+
+/* The largest code that an error may have without the vertex being selected for it; -1: none. */
+int32_t rqt_rule_threshold(const rqt_rule *rule, rqt_vertex v);
+/* outline: the vertex has the bit x, and it counts. */
+bool rqt_rule_selects(const rqt_rule *rule, rqt_vertex v, rqt_code error, bool outline);
 
 /* ----------------------------------------------------------------------------------- query and patch --
  * The mesh that answers a query. Vertices are samples, each once, in the order of the walk. */
@@ -552,7 +626,7 @@ void rqt_patch_free(rqt_patch *patch);
 typedef enum rqt_select { RQT_SELECT_THRESHOLD, RQT_SELECT_TOP_DOWN, RQT_SELECT_BOTTOM_UP } rqt_select;
 typedef enum rqt_outline { RQT_OUTLINE_EXACT, RQT_OUTLINE_TOL } rqt_outline;
 
-typedef struct rqt_answer { /* a block of the index that answers eps and whose extent meets the region's box */
+typedef struct rqt_answer { /* a block that answers the query and whose extent meets the region's box */
     rqt_block_number number;
     rqt_summary summary;
 } rqt_answer;
@@ -574,6 +648,7 @@ typedef struct rqt_query {
     int k;
     const rqt_region *region;
     rqt_code eps;
+    const rqt_rule *rule; /* NULL: eps alone; else eps is not looked at */
     rqt_select select;
     rqt_outline outline;
     rqt_product product;
@@ -589,8 +664,20 @@ typedef struct rqt_query {
 
 /* Does a block with this summary answer eps? */
 bool rqt_summary_answers(const rqt_summary *summary, rqt_outline outline, rqt_code eps);
-/* Does the query need this block's bytes, or is its summary enough? */
+/* Does a block hold all that a rule selects in its cell? If not its four children are to be asked, those there are;
+ * at stride 1 it always does. A block that does not answer the rule's own eps because em is above never does. */
+bool rqt_rule_is_answered(const rqt_rule *rule, const rqt_block_place *place, const rqt_summary *summary,
+                          rqt_outline outline);
+/* The same of its parent, of which the summary knows em: a block answers iff it is answered and this is false.
+ * False for the root. */
+bool rqt_rule_is_answered_above(const rqt_rule *rule, const rqt_block_place *place, const rqt_summary *summary,
+                                rqt_outline outline);
+/* Does a block with this summary have selected vertices beside its corners, at this eps? */
 bool rqt_summary_needs_block(const rqt_summary *summary, rqt_outline outline, rqt_code eps);
+/* Does the query select this vertex, on account of its own error? */
+bool rqt_query_selects(const rqt_query *query, rqt_vertex v, rqt_code error, uint8_t flags);
+/* Does it select vertices of an answer beside its corners? If not the summary is enough. */
+bool rqt_query_selects_inside(const rqt_query *query, const rqt_answer *answer);
 /* Does this query need an answer's bytes? Not where the summary is enough, nor where the block only touches the
  * region. Queries that close their selection (rqt_select) look at all that summaries leave open. */
 bool rqt_query_needs_block(const rqt_query *query, const rqt_answer *answer);
@@ -611,6 +698,33 @@ typedef struct rqt_leaf_corner {
  * corners as the patch of the point has them, in its order. */
 rqt_found rqt_query_leaf_at(const rqt_query *query, const rqt_answer *answer, const rqt_block *block, int64_t x,
                             int64_t y, rqt_leaf_corner leaf[3]);
+
+/* ----------------------------------------------------------------------------------------------- cut --
+ * Mode `cut`: the patch clipped to the region. Its triangles tile what the region and the leaves of the patch have
+ * in common; they have an area, turn counter-clockwise and share whole edges. Vertices on the region's border are
+ * samples no longer, but places between samples, with heights on the leaf's plane: in quanta, not whole ones. */
+typedef struct rqt_cut_vertex {
+    double col, row; /* multiples of 2^(lattice.K - 52) sample: exact */
+    double q;
+    rqt_code error; /* as in the patch; 0 where the vertex is no sample of it: the mesh needs it for no height */
+    int16_t level;  /* as in the patch; -1 there */
+} rqt_cut_vertex;
+
+typedef struct rqt_cut {
+    rqt_cut_vertex *vertices; /* each once, in the order of the triangles */
+    size_t vertex_count;
+    uint32_t *triangles; /* as in rqt_patch */
+    size_t triangle_count;
+    rqt_allocator allocator;
+    size_t vertex_capacity, triangle_capacity;
+} rqt_cut;
+
+/* patch: what a query has made of region, with triangles. Of members without an area (lines, points), whole leaves
+ * stay. is_interrupted may be NULL. RQT_INTERRUPTED, RQT_NO_MEMORY: cut is empty. */
+rqt_status rqt_cut_make(const rqt_patch *patch, const rqt_region *region, const rqt_lattice *lattice,
+                        const rqt_allocator *allocator, bool (*is_interrupted)(void *context), void *context,
+                        rqt_cut *cut);
+void rqt_cut_free(rqt_cut *cut);
 
 /* One generalized strip of a patch: n indices; triangle i is (s[i], s[i+1], s[i+2]), its last two swapped for odd
  * i, counter-clockwise; a triangle with two equal vertices is a join. An empty patch gives n = 0.
@@ -651,6 +765,33 @@ size_t rqt_metric_bytes(const rqt_lattice *lattice, rqt_metric metric);
 rqt_status rqt_metric_compute(const rqt_grid *grid, const rqt_unit *unit, const rqt_void_cost *cost,
                               rqt_metric metric, rqt_outline outline, const rqt_allocator *allocator,
                               bool (*progress)(void *context, double done), void *context, rqt_errors *closed);
+
+/* ------------------------------------------------------------------------------------------ profiles --
+ * The heights of a mesh along lines: between two rows the mesh is a plane. */
+typedef struct rqt_profile_line {
+    const double *xy;        /* points x,y, lines one after the other */
+    const uint8_t *ends;     /* is the point the last of its line? */
+    const uint8_t *own;      /* does the point get a row? Where a line only bends to follow a curve it does not */
+    size_t points;           /* below 2^32 */
+    rqt_placement placement; /* of the samples */
+    double period;           /* 0, or: the lines count at each multiple of it, added to x, that meets the raster */
+} rqt_profile_line;
+
+typedef struct rqt_profile_row {
+    uint32_t point;     /* on the piece of the line from this point to the next */
+    int32_t turn;       /* of the period */
+    double t;           /* where on the piece, 0 .. 1 */
+    bool at_point;      /* it is the point */
+    bool after_gap;     /* somewhere between the row before and this one there is no mesh, or the line was lifted */
+    double col, row, q; /* place and height on the mesh, in samples and quanta, between integers */
+} rqt_profile_row;
+
+/* A row for every place where a line meets an edge of the patch's triangles in a point (a vertex counts once), for
+ * both ends of what of an edge it runs along, and for its own points on the patch; in the order of the lines. Which
+ * rows there are is decided exactly, with the lines' points rounded to 2^-20 sample as those of regions are; where
+ * a line crosses an edge depends on the two alone. Release rows with allocator->resize(context, rows, 0). */
+rqt_status rqt_profile_build(const rqt_patch *patch, const rqt_lattice *lattice, const rqt_profile_line *line,
+                             const rqt_allocator *allocator, rqt_profile_row **rows, size_t *count);
 
 /* --------------------------------------------------------------------------------------- mesh formats --
  * The formats of our own that stand alone (FORMAT.md, "Mesh"): 'strip' and 'indexed'. */
@@ -700,6 +841,7 @@ rqt_status rqt_mesh_decode(const uint8_t *bytes, size_t size, rqt_mesh_header *h
 
 typedef struct rqt_wire_header {
     bool is_delta;
+    bool has_normals; /* rqt_wire_normals has something to give; never for an increment */
     rqt_lattice lattice;
     int k;                                 /* block size of the terrain: the order of the walk depends on it */
     uint64_t vertex_count, triangle_count; /* of the mesh; of an increment: of the mesh that it ends in */
@@ -733,6 +875,22 @@ rqt_status rqt_wire_decode(const uint8_t *bytes, size_t size, bool wants_leaves,
 rqt_status rqt_wire_apply(const rqt_wire_header *state_header, const rqt_patch *state, const uint8_t *bytes,
                           size_t size, const rqt_allocator *allocator, rqt_wire_header *header, rqt_patch *patch,
                           rqt_message *message);
+/* Normals beside a mesh: unit vectors of the terrain at its vertices, x east, y north, z up, z > 0 but for
+ * rounding; two bytes each. _pack: to the nearest of its 255 x 255 directions, 0.56 degrees off at worst, straight
+ * up exactly; _unpack: a unit vector. */
+void rqt_normal_pack(const float normal[3], int8_t packed[2]);
+void rqt_normal_unpack(const int8_t packed[2], float normal[3]);
+/* Appends them, 3 floats a vertex in the patch's order, to what rqt_wire_encode wrote; bytes has room for
+ * rqt_wire_normals_bound more. RQT_INVALID for an increment, another number of vertices, or a mesh that has some.
+ */
+size_t rqt_wire_normals_bound(size_t vertex_count);
+rqt_status rqt_wire_add_normals(const float *normals, size_t vertex_count, const rqt_allocator *allocator,
+                                uint8_t *bytes, size_t *size);
+/* The normals of a mesh that rqt_wire_decode has read, which has vertex_count vertices; normals has room for three
+ * floats each. Trusts nothing, as rqt_wire_decode; RQT_INVALID when they are none, or of another number of
+ * vertices. */
+rqt_status rqt_wire_normals(const uint8_t *bytes, size_t size, size_t vertex_count, const rqt_allocator *allocator,
+                            float *normals, rqt_message *message);
 /* What an increment knows a mesh by: its vertices, their levels and heights, and its leaves, in their order. */
 uint64_t rqt_wire_digest(const rqt_patch *patch);
 

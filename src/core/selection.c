@@ -115,22 +115,17 @@ rqt_status rqt_selection_add_resolved(rqt_selection *s, rqt_vertex v) {
     return RQT_OK;
 }
 
-/* Vertices of one rank: 2 * scale for sides, 2 * scale + 1 for centres; a parent's rank is always higher. */
+/* Vertices of one rank: a parent's is always higher. */
 typedef struct bucket {
     uint64_t *key;
     size_t count, capacity;
 } bucket;
 
-static int rank_of(const rqt_lattice *lattice, rqt_vertex v) {
-    const int scale = rqt_vertex_scale(lattice, v);
-    return 2 * scale + (((v.x >> scale) & (v.y >> scale) & 1) ? 1 : 0);
-}
-
 static rqt_status mark(rqt_selection *s, bucket *buckets, rqt_vertex v) {
     bool added;
     const rqt_status status = insert(s, v, &added);
     if (status != RQT_OK || !added) return status;
-    bucket *b = &buckets[rank_of(&s->lattice, v)];
+    bucket *b = &buckets[rqt_vertex_rank(&s->lattice, v)];
     if (!memory_grow(&s->allocator, (void **)&b->key, &b->capacity, b->count + 1, sizeof *b->key))
         return RQT_NO_MEMORY;
     b->key[b->count++] = key_of(v);
@@ -138,17 +133,17 @@ static rqt_status mark(rqt_selection *s, bucket *buckets, rqt_vertex v) {
 }
 
 rqt_status rqt_selection_add_bottom_up(rqt_selection *s, const rqt_vertex *vertices, size_t n) {
-    bucket buckets[2 * RQT_MAX_K + 2] = {{0}};
+    bucket buckets[RQT_RANKS] = {{0}};
     rqt_status status = RQT_OK;
     for (size_t i = 0; i < n && status == RQT_OK; i++) status = mark(s, buckets, vertices[i]);
-    for (int rank = 0; rank < 2 * RQT_MAX_K + 2 && status == RQT_OK; rank++) {
+    for (int rank = 0; rank < RQT_RANKS && status == RQT_OK; rank++) {
         for (size_t i = 0; i < buckets[rank].count && status == RQT_OK; i++) {
             rqt_vertex parents[2];
             const int count = rqt_vertex_parents(&s->lattice, vertex_of(buckets[rank].key[i]), parents);
             for (int p = 0; p < count && status == RQT_OK; p++) status = mark(s, buckets, parents[p]);
         }
     }
-    for (int rank = 0; rank < 2 * RQT_MAX_K + 2; rank++) memory_drop(&s->allocator, buckets[rank].key);
+    for (int rank = 0; rank < RQT_RANKS; rank++) memory_drop(&s->allocator, buckets[rank].key);
     return status;
 }
 

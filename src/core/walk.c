@@ -16,6 +16,7 @@
  * first child is left through a leg, the second one entered through a leg, and a further split turns leg and
  * hypotenuse about. The vertex that both edges share, the pivot, is said once more if it was the pivot before.
  */
+#include "rule.h"
 #include "walk.h"
 
 typedef struct half {
@@ -51,16 +52,62 @@ static uint8_t choose_by_error(const rqt_block *b, size_t count, rqt_code eps, u
     return all;
 }
 
+/* The same where vertices have thresholds of their own: down from the block's centre, as far as they are selected.
+ */
+typedef struct choosing {
+    const walk *w;
+    rule_range range;
+    uint8_t mask, all;
+} choosing;
+
+static bool choose_place(choosing *c, uint32_t place) {
+    const walk *w = c->w;
+    if (w->chosen[place]) return true;
+    const rqt_code error = w->block->error[place];
+    const uint8_t flags = w->block->flags[place];
+    if (!(error > c->range.most || (flags & c->mask))) {
+        if (error <= c->range.least && !c->range.forced) return false;
+        if (!rqt_rule_selects(w->query->rule, place_vertex(w, place), error, false)) return false;
+    }
+    c->all &= flags;
+    w->chosen[place] = 1;
+    return true;
+}
+
+static void choose_below(choosing *c, uint32_t a, uint32_t l, uint32_t r, int splits) {
+    const uint32_t m = (l + r) / 2;
+    if (splits == 0 || !choose_place(c, m)) return;
+    choose_below(c, m, l, a, splits - 1);
+    choose_below(c, m, a, r, splits - 1);
+}
+
+static uint8_t choose_by_rule(const walk *w, uint8_t mask) {
+    const uint32_t n = (uint32_t)w->n, last = n - 1, corners[4] = {0, last, last * n, last * n + last};
+    const rqt_vertex centre = {w->place.x + w->place.side / 2, w->place.y + w->place.side / 2};
+    choosing c = {w, rule_range_below(w->query->rule, centre), mask, 0xFF};
+    if (c.range.least == c.range.most && c.range.least >= 0 && !c.range.forced)
+        return choose_by_error(w->block, (size_t)n * n, (rqt_code)c.range.least, mask, w->chosen);
+    memset(w->chosen, 0, (size_t)n * n);
+    /* The diagonal from one corner to the one across; query.c has the same cases. */
+    const int from = w->place.level == 0 ? 0 : (w->place.i & 1) | (w->place.j & 1) << 1;
+    choose_below(&c, corners[from ^ 1], corners[from], corners[3 - from], 2 * w->query->k);
+    choose_below(&c, corners[from ^ 2], corners[3 - from], corners[from], 2 * w->query->k);
+    return c.all;
+}
+
 void walk_choose(walk *w) {
     const uint32_t n = (uint32_t)w->n, last = n - 1;
     const uint8_t mask = w->query->outline == RQT_OUTLINE_EXACT ? RQT_OUTLINE : 0, *const flags = w->block->flags;
-    uint8_t all = choose_by_error(w->block, (size_t)n * n, w->query->eps, mask, w->chosen);
-    for (uint32_t i = 0; w->selection && i < n * n; i++) {
-        const rqt_vertex at = {w->place.x + (int32_t)(i % n) * w->place.stride,
-                               w->place.y + (int32_t)(i / n) * w->place.stride};
-        w->chosen[i] = rqt_selection_has(w->selection, at);
-        if (w->chosen[i]) all &= flags[i];
-    }
+    uint8_t all = 0xFF;
+    if (w->selection)
+        for (uint32_t i = 0; i < n * n; i++) {
+            w->chosen[i] = rqt_selection_has(w->selection, place_vertex(w, i));
+            if (w->chosen[i]) all &= flags[i];
+        }
+    else if (w->query->rule)
+        all = choose_by_rule(w, mask);
+    else
+        all = choose_by_error(w->block, (size_t)n * n, w->query->eps, mask, w->chosen);
     all &= flags[0] & flags[last] & flags[last * n] & flags[last * n + last];
     w->plain = (all & RQT_VALID) && !w->clamped && !w->aliased && !w->query->wants_leaves;
 }
@@ -229,8 +276,7 @@ void walk_emit(walk *w, const corner *a, const corner *l, const corner *r, bool 
 
 /* The vertex at a place of the block's arrays. */
 static corner block_corner(const walk *w, uint32_t place) {
-    const int32_t stride = w->place.stride, u = (int32_t)place % w->n, v = (int32_t)place / w->n;
-    return (corner){.at = {w->place.x + u * stride, w->place.y + v * stride},
+    return (corner){.at = place_vertex(w, place),
                     .q = w->block->q[place],
                     .error = w->block->error[place],
                     .flags = w->block->flags[place],

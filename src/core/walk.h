@@ -83,6 +83,11 @@ typedef struct walk {
     bool plain;   /* no leaf has a void corner or one past the last sample, and nobody asks for the leaves */
 } walk;
 
+static inline rqt_vertex place_vertex(const walk *w, uint32_t place) {
+    const int32_t v = (int32_t)(place * w->inverse >> 32), u = (int32_t)place - v * w->n;
+    return (rqt_vertex){w->place.x + u * w->place.stride, w->place.y + v * w->place.stride};
+}
+
 /* A corner of a leaf on its way into the patch. */
 typedef struct corner {
     rqt_vertex at; /* lattice */

@@ -24,6 +24,11 @@ static inline uint8_t *put_u32(uint8_t *p, uint32_t v) {
     for (int i = 0; i < 4; i++) p[i] = (uint8_t)(v >> 8 * i);
     return p + 4;
 }
+static inline uint8_t *put_float(uint8_t *p, float v) {
+    uint32_t bits;
+    memcpy(&bits, &v, 4);
+    return put_u32(p, bits);
+}
 static inline uint8_t *put_double(uint8_t *p, double v) {
     uint64_t bits;
     memcpy(&bits, &v, 8);
@@ -37,8 +42,9 @@ int format_digits(uint64_t v, char *text);
 /* Bytes of the multipolygon of that many triangles: kind is wkb, gpkg or spatialite. At most 109 per triangle + 52;
  * triangles is at most FORMAT_LIMIT. geometry.c */
 uint64_t geometry_size(format_kind kind, uint64_t triangles);
-/* Writes exactly that many. */
-void geometry_write(format_kind kind, const rqt_patch *patch, const format_frame *frame, const format_box *box,
-                    uint8_t *bytes);
+/* Writes exactly that many. False when a coordinate is not finite; the bytes are then no geometry. */
+bool geometry_write(format_kind kind, const format_mesh *mesh, uint8_t *bytes);
+/* x,y,z of a vertex; are all three finite? */
+bool mesh_coordinates(const format_mesh *mesh, size_t vertex, double xyz[3]);
 
 #endif

@@ -1,83 +1,43 @@
-/* geo.cpp - geodesic circles.
- *
- * A point of the circle is the end of the geodesic of length `radius` that leaves the centre at some azimuth. This
- * is the boundary of the disc of that radius as long as no shorter way leads to the end, which holds up to pi times
- * the polar radius (19,970 km) on WGS 84; the refusal of poles keeps radii below 10,002 km, so nothing else has to
- * be refused. Geodesic::Direct with LONG_UNROLL tells the longitude without reducing it to one turn: it is lon plus
- * what the geodesic turned, and because no geodesic of the circle gets as far as a pole, that turn is continuous
- * all around.
- *
- * GeographicLib throws, and C cannot catch: whatever it throws ends here, as a sentence.
- */
-#include "geo.h"
+/* geo.cpp - the version, and the ellipsoid of a CRS. */
+#include "internal.h"
 
 #include <GeographicLib/Config.h>
-#include <GeographicLib/Geodesic.hpp>
 
 #include <cmath>
-#include <cstdio>
-#include <exception>
-
-namespace {
-
-using GeographicLib::Geodesic;
-
-constexpr double SMALLEST_RADIUS = 1e-3;
-constexpr double POLE_MARGIN = 1e-3; /* metres; nearer than that, the ring's longitudes tell nothing */
-
-int refuse(char *message, int message_size, const char *sentence) {
-    if (message && message_size > 0) std::snprintf(message, static_cast<std::size_t>(message_size), "%s", sentence);
-    return 1;
-}
-
-/* A number without decimals, so that the sentence does not depend on the locale. */
-int refuse_radius(char *message, int message_size, double distance) {
-    if (message && message_size > 0)
-        std::snprintf(message, static_cast<std::size_t>(message_size),
-                      "the circle reaches a pole, which is %.0f metres from its centre: the radius must be less",
-                      std::floor(distance));
-    return 1;
-}
-
-} // namespace
-
-extern "C" int geo_circle(double lon, double lat, double radius, int n, double *lonlat, char *message,
-                          int message_size) {
-    try {
-        /* Written so that NaN fails. */
-        if (!(std::fabs(lon) <= 360))
-            return refuse(message, message_size, "the longitude must be a number from -360 to 360");
-        if (!(std::fabs(lat) <= 90))
-            return refuse(message, message_size, "the latitude must be a number from -90 to 90");
-        if (!(radius > 0) || std::isinf(radius))
-            return refuse(message, message_size, "the radius must be a positive number of metres");
-        if (radius < SMALLEST_RADIUS)
-            return refuse(message, message_size, "the radius must be at least a millimetre");
-        if (n < 3 || n > GEO_CIRCLE_POINTS || !lonlat)
-            return refuse(message, message_size, "a circle is made of 3 to 1000000 points");
-
-        const Geodesic &earth = Geodesic::WGS84();
-        double to_pole = 0;
-        earth.Inverse(lat, lon, std::copysign(90.0, lat), lon, to_pole);
-        if (radius > to_pole - POLE_MARGIN) return refuse_radius(message, message_size, to_pole);
-
-        for (int i = 0; i < n; i++) {
-            double azimuth = 90 - 360.0 * i / n; /* clockwise from north, so falling is counter-clockwise */
-            double point_lat = 0, point_lon = 0, unused = 0;
-            earth.GenDirect(lat, lon, azimuth, false, radius,
-                            Geodesic::LATITUDE | Geodesic::LONGITUDE | Geodesic::LONG_UNROLL, point_lat, point_lon,
-                            unused, unused, unused, unused, unused, unused);
-            lonlat[2 * i] = point_lon;
-            lonlat[2 * i + 1] = point_lat;
-        }
-        return 0;
-    } catch (const std::exception &e) {
-        return refuse(message, message_size, e.what());
-    } catch (...) {
-        return refuse(message, message_size, "GeographicLib failed");
-    }
-}
+#include <cstring>
 
 extern "C" const char *geo_version(void) {
     return GEOGRAPHICLIB_VERSION_STRING;
+}
+
+/* A number as WKT writes it: with a point, whatever the locale. */
+static bool read_number(const char **text, double *value) {
+    const char *p = *text;
+    double v = 0, unit = 1;
+    bool any = false;
+    for (; *p >= '0' && *p <= '9'; p++, any = true) v = 10 * v + (*p - '0');
+    if (*p == '.')
+        for (p++; *p >= '0' && *p <= '9'; p++, any = true) {
+            v = 10 * v + (*p - '0');
+            unit *= 10;
+        }
+    if (any && (*p == 'e' || *p == 'E')) return false;
+    *text = p;
+    *value = v / unit;
+    return any;
+}
+
+extern "C" int geo_ellipsoid_of_wkt(const char *wkt, geo_ellipsoid *out) {
+    const char *p = std::strstr(wkt, "SPHEROID[");
+    const char *const q = std::strstr(wkt, "ELLIPSOID[");
+    if (!p || (q && q < p)) p = q;
+    if (p) p = std::strchr(p, '"');
+    if (p) p = std::strchr(p + 1, '"');
+    double a = 0, inverse = 0;
+    if (!p || p[1] != ',') return 0;
+    p += 2;
+    if (!read_number(&p, &a) || *p++ != ',' || !read_number(&p, &inverse)) return 0;
+    if (!(a > 1000 && a < 1e9) || (inverse != 0 && !(inverse > 10))) return 0;
+    *out = geo_ellipsoid{a, inverse == 0 ? 0 : 1 / inverse};
+    return 1;
 }

@@ -182,9 +182,9 @@ void import_database_close(const import_job *job, import_database *d) {
     if (d->created) {
         static const char *const parts[] = {"", "-journal", "-wal", "-shm"};
         for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
-            char *name = sqlite3_mprintf("%s%s", job->database, parts[i]);
-            if (name) unlink(name);
-            sqlite3_free(name);
+            char name[4096 + 16]; /* no longer than what could be created; memory may be what is missing */
+            const int n = snprintf(name, sizeof name, "%s%s", job->database, parts[i]);
+            if (n > 0 && (size_t)n < sizeof name) unlink(name);
         }
     }
     *d = (import_database){0};

@@ -20,6 +20,11 @@ typedef struct import_options {
     int64_t memory;   /* bytes that the import may take */
     bool replace;
     bool minimal; /* store minimal errors, too */
+    int fill;     /* voids within a square of 2 * fill + 1 samples become heights; 0: none */
+    bool has_sea;
+    double sea;         /* metres that every void which is left gets */
+    bool resumable;     /* a resume file even where all fits in memory */
+    const char *report; /* a GeoJSON file of gaps, overlaps and conflicts; NULL: none */
     /* Progress: share 0..1 of one stage ("reading", "errors" - and blocks made of them -, "blocks" written,
      * "minimal errors"); samples of the whole. NULL: silent. False stops the import, which leaves the database as
      * it was. */
@@ -35,15 +40,23 @@ void import_options_init(import_options *options); /* the defaults */
 typedef struct import_report {
     char name[64];
     int64_t samples, voids, blocks, bytes;
+    int64_t sources;                  /* rasters */
     int64_t overlap, overlap_differs; /* samples that more than one source has, and those where they disagree */
+    int64_t filled, sea;              /* voids that became heights: not among the voids */
+    int64_t samples_read;             /* from the sources, by this run; where they overlap, from each */
+    int64_t samples_resumed;          /* read from them by an earlier run, and now from its resume file */
+    int64_t spooled;                  /* bytes of the resume file when all was read, 0: none was needed */
     double seconds_read;              /* the first reading */
     double seconds_errors;            /* errors and blocks, with the second reading where there is one */
     double seconds_blocks;            /* writing them */
 } import_report;
 
+#define IMPORT_MOST_FILL 255
+
 /* Import the sources (one grid, one terrain) into the database file, which is created as a GeoPackage when it does
- * not exist or is empty. Returns 0, or 1 with a sentence in message: the database is then as it was (a file that
- * the import created is gone). */
+ * not exist or is empty. A source is a raster, a folder of rasters, or @FILE, a list of them, one a line. Returns
+ * 0, or 1 with a sentence in message: the database is then as it was (a file that the import created is gone). When
+ * what was read so far is in a resume file, the sentence says so, and the same import goes on from there. */
 int import_run(const char *const *sources, int count, const char *database, const import_options *options,
                import_report *report, char *message, size_t message_size);
 

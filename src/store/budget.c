@@ -41,18 +41,28 @@ static int answer(store *s, const store_terrain *t, store_question *question, rq
     return code;
 }
 
-static int begin(store *s, const store_terrain *t, double eps, rqt_patch *patch, store_reads *reads, char **error) {
+static int begin(store *s, const store_terrain *t, double eps, const store_query_options *options, rqt_patch *patch,
+                 store_reads *reads, char **error) {
     memset(patch, 0, sizeof *patch);
     if (reads) memset(reads, 0, sizeof *reads);
     if (!(eps >= 0)) return store_fail(error, SQLITE_ERROR, "eps must be a number of metres, 0 or more");
+    if (options->rule && options->metric == RQT_METRIC_MINIMAL)
+        return store_fail(error, SQLITE_ERROR,
+                          "the metric minimal has no bound where vertices are added, as a rule does");
     return store_begin_on(s, t, error);
+}
+
+/* A rule knows its eps in metres, so that it can be lowered. */
+static void set_eps(const store_query_options *options, double eps) {
+    if (options->rule) (void)rqt_rule_set_eps(options->rule, eps);
 }
 
 int store_query(store *s, const store_terrain *t, const rqt_region *region, double eps,
                 const store_query_options *options, rqt_patch *patch, store_reads *reads, char **error) {
-    int code = begin(s, t, eps, patch, reads, error);
+    int code = begin(s, t, eps, options, patch, reads, error);
     if (code != SQLITE_OK) return code;
     store_question question = {.region = region, .eps = rqt_code_eps(eps, t->quantum_error), .options = options};
+    set_eps(options, eps);
     code = answer(s, t, &question, patch, reads, NULL, error);
     store_end(s);
     return code;
@@ -76,13 +86,20 @@ typedef struct search {
     store_question question;
     rqt_patch *patch; /* of the last question that fitted */
     char **error;
+    rqt_code low; /* that of the eps that was asked for */
+    double eps;
     rqt_code largest;
 } search;
+
+static double eps_of(const search *f, rqt_code code) {
+    return code > f->low ? metres_of(code, f->terrain->quantum_error) : f->eps;
+}
 
 /* Does the mesh of this code fit? The patch is then kept. */
 static int try_code(search *f, rqt_code code, bool *fits) {
     rqt_patch patch;
     f->question.eps = code;
+    set_eps(f->question.options, eps_of(f, code));
     const int result = answer(f->store, f->terrain, &f->question, &patch, NULL, &f->largest, f->error);
     *fits = result == SQLITE_OK && !f->question.over;
     if (!*fits) return result;
@@ -91,8 +108,9 @@ static int try_code(search *f, rqt_code code, bool *fits) {
     return SQLITE_OK;
 }
 
-/* The smallest code >= low that fits, in *found. */
-static int find_code(search *f, rqt_code low, rqt_code *found) {
+/* The smallest code >= f->low that fits, in *found. */
+static int find_code(search *f, rqt_code *found) {
+    const rqt_code low = f->low;
     bool fits;
     int code = try_code(f, RQT_CODE_LARGEST, &fits);
     if (code != SQLITE_OK) return code;
@@ -134,7 +152,7 @@ int store_query_within(store *s, const store_terrain *t, const rqt_region *regio
                        const store_query_options *options, int64_t max_vertices, double *achieved, rqt_patch *patch,
                        store_reads *reads, char **error) {
     *achieved = eps;
-    int code = begin(s, t, eps, patch, reads, error);
+    int code = begin(s, t, eps, options, patch, reads, error);
     if (code != SQLITE_OK) return code;
     const rqt_code low = rqt_code_eps(eps, t->quantum_error);
     rqt_code found = low;
@@ -142,14 +160,17 @@ int store_query_within(store *s, const store_terrain *t, const rqt_region *regio
                 .terrain = t,
                 .question = {.region = region, .options = options, .most = (size_t)max_vertices},
                 .patch = patch,
-                .error = error};
+                .error = error,
+                .low = low,
+                .eps = eps};
     code = max_vertices < 4 ? store_fail(error, SQLITE_ERROR, "max_vertices must be 4 or more")
-                            : find_code(&f, low, &found);
-    if (code == SQLITE_OK && found > low) *achieved = metres_of(found, t->quantum_error);
+                            : find_code(&f, &found);
+    if (code == SQLITE_OK) *achieved = eps_of(&f, found);
     if (code == SQLITE_OK && reads) {
         /* Once more, to tell what it reads. */
         rqt_patch_free(patch);
         store_question question = {.region = region, .eps = found, .options = options};
+        set_eps(options, *achieved);
         code = answer(s, t, &question, patch, reads, NULL, error);
     }
     if (code != SQLITE_OK) rqt_patch_free(patch);

@@ -674,6 +674,7 @@ int store_check(store *s, const store_terrain *t, bool (*tell_one)(void *context
     if (c.row && !ended(&c)) visit(&c, 0, 0, 0);
     if (c.row && !ended(&c)) check_tables(&c);
     destroy(&c);
+    if (!ended(&c)) c.code = store_check_fill(s, t, tell_one, context, error);
     if (!ended(&c)) c.code = store_check_minimal(s, t, tell_one, context, error);
     return c.code;
 }

@@ -3,7 +3,6 @@
 #include "internal.h"
 
 #include <math.h>
-#include <string.h>
 
 static double metres_of(const rqt_unit *unit, double q) {
     return ((double)unit->z0 + q / (double)unit->d) * rqt_unit_factor(unit) + unit->offset;
@@ -121,15 +120,11 @@ static int mesh_height(store *s, const store_terrain *t, double x, double y, dou
         *found = code == SQLITE_OK && what == RQT_FOUND_LEAF;
         return code;
     }
-    const uint32_t point = 1; /* also tells this machine's byte order, which the first byte of WKB names */
-    uint8_t wkb[21] = {*(const uint8_t *)&point};
-    memcpy(wkb + 1, &point, 4);
-    memcpy(wkb + 5, &x, 8);
-    memcpy(wkb + 13, &y, 8);
     rqt_geometry *geometry = NULL;
     rqt_region *region = NULL;
-    rqt_message why = {""};
-    rqt_status status = rqt_geometry_parse(wkb, sizeof wkb, false, store_allocator(), &geometry, &why);
+    const double point[2] = {x, y};
+    const size_t one = 1;
+    rqt_status status = rqt_geometry_of_lines(point, &one, 1, 0, store_allocator(), &geometry);
     if (status == RQT_OK)
         status = rqt_region_create(geometry, &t->placement, &t->lattice, store_allocator(), &region);
     code = store_fail_core(error, status, "the point");
@@ -151,11 +146,22 @@ static int mesh_height(store *s, const store_terrain *t, double x, double y, dou
     return code;
 }
 
+/* Longitudes are the same modulo 360: the one on the turn that holds terrain; as it is when no turn does. */
+static double turned(const store_terrain *t, double x) {
+    const double first = t->placement.x0, last = first + (t->lattice.width - 1) * t->placement.dx;
+    const double low = fmin(first, last), high = fmax(first, last);
+    if (!t->lonlat || (x >= low && x <= high) || fabs(x) > 3 * 360.0) return x;
+    const double turn = x < low ? ceil((low - x) / 360) : floor((high - x) / 360);
+    const double there = x + turn * 360;
+    return there >= low && there <= high ? there : x;
+}
+
 int store_height(store *s, const store_terrain *t, double x, double y, double eps, double *metres, bool *found,
                  char **error) {
     *metres = 0;
     *found = false;
     if (!isfinite(x) || !isfinite(y)) return store_fail(error, SQLITE_ERROR, "x and y must be finite numbers");
+    x = turned(t, x);
     /* Regions round coordinates to 2^-20 sample; so do we, or a place on the border would fall off it by an ulp. */
     const double col = nearbyint((x - t->placement.x0) / t->placement.dx * 0x1p20) * 0x1p-20;
     const double row = nearbyint((y - t->placement.y0) / t->placement.dy * 0x1p20) * 0x1p-20;

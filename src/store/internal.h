@@ -91,9 +91,7 @@ int store_query_computed(store *s, const store_terrain *t, store_question *quest
 void store_methods_free(store *s);
 /* A row per answer of a query, as its summary has it. query.c */
 int store_begin_reads(const rqt_query *query, store_reads *reads);
-int64_t store_count_selected(const rqt_query *query, const rqt_block *block);
-/* Was sqlite3_interrupt called? *code says how to end. query.c */
-bool store_is_interrupted(store *s, int *code);
+int64_t store_count_selected(const rqt_query *query, rqt_block_number number, const rqt_block *block);
 
 #define STORE_MINIMAL "_minimal" /* suffix of the tables that hold minimal errors */
 /* A writer of those tables, beside a terrain of main that is complete. writer.c */
@@ -125,6 +123,10 @@ int store_take_pyramid(store *s, const store_terrain *t, rqt_metric metric, rqt_
 /* What rqt_check finds of the minimal errors of a terrain, as store_check. minimal.c */
 int store_check_minimal(store *s, const store_terrain *t, bool (*tell)(void *context, const store_finding *finding),
                         void *context, char **error);
+/* Does it have the table of what was filled? The same check of that. fill.c */
+bool store_has_fill(sqlite3 *db, const store_terrain *t);
+int store_check_fill(store *s, const store_terrain *t, bool (*tell)(void *context, const store_finding *finding),
+                     void *context, char **error);
 /* The terrain as the tables of its minimal errors have it; NULL when it has none. minimal.c */
 const store_terrain *store_minimal(store *s, const store_terrain *t);
 

@@ -217,6 +217,7 @@ int store_take_pyramid(store *s, const store_terrain *t, rqt_metric metric, rqt_
                        const rqt_pyramid **pyramid, char **error) {
     method *m = NULL;
     const int code = take_method(s, t, metric, outline, &m, error);
+    /* NOLINTNEXTLINE(clang-analyzer-core.NullDereference): set when the code says so */
     if (code == SQLITE_OK) *pyramid = m->pyramid;
     return code;
 }
@@ -265,7 +266,7 @@ static const rqt_block *make_block(void *context, rqt_block_number number) {
         *row = (store_read){.number = number,
                             .needs_bytes = true,
                             .cached = cached,
-                            .selected = store_count_selected(c->query, block)};
+                            .selected = store_count_selected(c->query, number, block)};
     return block;
 }
 
@@ -276,14 +277,20 @@ static bool is_interrupted(void *context) {
 }
 
 /* The blocks that meet the box and answer, as the index would find them. */
-static size_t find_answers(const method *m, const store_terrain *t, const int32_t box[4], rqt_outline outline,
-                           rqt_code eps, rqt_answer *answers) {
+static size_t find_answers(const method *m, const store_terrain *t, const int32_t box[4],
+                           const store_question *question, rqt_answer *answers) {
+    const rqt_outline outline = question->options->outline;
+    const rqt_rule *rule = question->options->rule;
     const int32_t last_x = t->lattice.width - 1, last_y = t->lattice.height - 1;
     size_t count = 0;
     for (size_t n = 0; n < m->count; n++) {
         rqt_block_place p;
-        if (!rqt_summary_answers(&m->answers[n].summary, outline, eps)) continue;
+        const rqt_summary *summary = &m->answers[n].summary;
         (void)rqt_block_locate(&t->lattice, t->k, m->answers[n].number, &p);
+        if (rule ? !rqt_rule_is_answered(rule, &p, summary, outline) ||
+                       rqt_rule_is_answered_above(rule, &p, summary, outline)
+                 : !rqt_summary_answers(summary, outline, question->eps))
+            continue;
         const int32_t x1 = p.x + p.side < last_x ? p.x + p.side : last_x,
                       y1 = p.y + p.side < last_y ? p.y + p.side : last_y;
         if (x1 < box[0] || p.x > box[1] || y1 < box[2] || p.y > box[3]) continue;
@@ -301,22 +308,25 @@ int store_query_computed(store *s, const store_terrain *t, store_question *quest
     method *m = NULL;
     int code = take_method(s, t, options->metric, options->outline, &m, error);
     if (code != SQLITE_OK) return code;
+    /* NOLINTNEXTLINE(clang-analyzer-core.NullDereference): set when the code says so */
     if (largest) *largest = m->largest;
     int32_t box[4];
     if (!rqt_region_box(question->region, &box[0], &box[2], &box[1], &box[3])) return SQLITE_OK;
+    /* NOLINTNEXTLINE(clang-analyzer-core.NullDereference): set when the code says so */
     rqt_answer *answers = sqlite3_malloc64(m->count * sizeof *answers);
     if (!answers) return SQLITE_NOMEM;
     rqt_query query = {.lattice = t->lattice,
                        .k = t->k,
                        .region = question->region,
                        .eps = question->eps,
+                       .rule = options->rule,
                        .select = options->select,
                        .outline = options->outline,
                        .wants_leaves = options->wants_leaves,
                        .product = options->product,
                        .scratch = s->scratch,
                        .answers = answers,
-                       .answer_count = find_answers(m, t, box, options->outline, question->eps, answers),
+                       .answer_count = find_answers(m, t, box, question, answers),
                        .read_block = make_block,
                        .is_interrupted = is_interrupted};
     const uint64_t field = 2 * (uint64_t)options->metric + (options->outline == RQT_OUTLINE_TOL) + 1;
@@ -333,6 +343,7 @@ int store_query_computed(store *s, const store_terrain *t, store_question *quest
         status == RQT_READ_FAILED || status == RQT_INTERRUPTED ? c.code : store_fail_core(error, status, "query");
     if (code == SQLITE_OK && reads && !reads->rows && !question->over) code = store_begin_reads(&query, reads);
     if (code == SQLITE_OK && reads)
+        /* NOLINTNEXTLINE(clang-analyzer-core.NullDereference): as many rows as are counted */
         for (size_t i = 0; i < reads->count; i++) reads->rows[i].computed = true;
     if (code != SQLITE_OK && reads) store_reads_free(reads);
     sqlite3_free(answers);

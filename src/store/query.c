@@ -2,6 +2,10 @@
  *
  * The R-tree holds, per block, its extent and the closed interval of error codes in which it answers. Nothing is
  * taken on trust: every summary is checked, and areas are summed to prove that the answers tile the region's box.
+ *
+ * A rule (rqt_rule) never takes a block above the one that answers its own eps. So the index finds where to begin,
+ * with the same proof, and blocks that do not hold all that the rule selects give way to their children, by number:
+ * those tile them.
  */
 #include "internal.h"
 
@@ -30,6 +34,17 @@ typedef struct answer_list {
     size_t count, capacity;
 } answer_list;
 
+static rqt_answer *add_answer(answer_list *list) {
+    if (list->count == list->capacity) {
+        const size_t more = list->capacity ? 2 * list->capacity : 64;
+        rqt_answer *rows = sqlite3_realloc64(list->rows, more * sizeof *rows);
+        if (!rows) return NULL;
+        list->rows = rows;
+        list->capacity = more;
+    }
+    return &list->rows[list->count++];
+}
+
 /* The answering blocks that meet the box; and a proof that the index is whole: their cells tile the box. */
 static int find_answers(store *s, const store_terrain *t, const int32_t box[4], rqt_outline outline, rqt_code eps,
                         answer_list *list, char **error) {
@@ -50,17 +65,11 @@ static int find_answers(store *s, const store_terrain *t, const int32_t box[4], 
     }
     const int64_t wanted = (int64_t)(proof[1] - proof[0]) * (proof[3] - proof[2]);
     while ((code = sqlite3_step(row)) == SQLITE_ROW) {
-        if (list->count == list->capacity) {
-            const size_t more = list->capacity ? 2 * list->capacity : 64;
-            rqt_answer *rows = sqlite3_realloc64(list->rows, more * sizeof *rows);
-            if (!rows) {
-                code = SQLITE_NOMEM;
-                break;
-            }
-            list->rows = rows;
-            list->capacity = more;
+        rqt_answer *answer = add_answer(list);
+        if (!answer) {
+            code = SQLITE_NOMEM;
+            break;
         }
-        rqt_answer *answer = &list->rows[list->count];
         answer->number = (rqt_block_number)sqlite3_column_int64(row, 0);
         const void *bytes = sqlite3_column_blob(row, 1);
         const int size = sqlite3_column_bytes(row, 1);
@@ -75,7 +84,6 @@ static int find_answers(store *s, const store_terrain *t, const int32_t box[4], 
         const int64_t x0 = p.x > proof[0] ? p.x : proof[0], x1 = p.x + p.side < proof[1] ? p.x + p.side : proof[1];
         const int64_t y0 = p.y > proof[2] ? p.y : proof[2], y1 = p.y + p.side < proof[3] ? p.y + p.side : proof[3];
         if (x1 > x0 && y1 > y0) covered += (x1 - x0) * (y1 - y0);
-        list->count++;
         if (covered > wanted) break; /* blocks over one another */
     }
     sqlite3_reset(row);
@@ -86,6 +94,45 @@ static int find_answers(store *s, const store_terrain *t, const int32_t box[4], 
     }
     if (!*error && code != SQLITE_NOMEM) code = store_fail_db(error, s->db, code, "reading the index");
     return code;
+}
+
+/* The children of a block that are there and whose extents meet the box, to the list. */
+static int add_children(store *s, const store_terrain *t, const rqt_block_place *p, const int32_t box[4],
+                        answer_list *list, char **error) {
+    for (int c = 0; c < 4; c++) {
+        const rqt_block_number number = rqt_block_number_of(p->level + 1, 2 * p->i + (c & 1), 2 * p->j + (c >> 1));
+        rqt_block_place child;
+        if (rqt_block_locate(&t->lattice, t->k, number, &child) != RQT_OK) continue;
+        const rqt_vertex end =
+            rqt_vertex_clamp(&t->lattice, (rqt_vertex){child.x + child.side, child.y + child.side});
+        if (end.x < box[0] || child.x > box[1] || end.y < box[2] || child.y > box[3]) continue;
+        const rqt_summary *summary;
+        const int code = store_get_summary(s, t, number, &summary, error);
+        if (code != SQLITE_OK) return code;
+        rqt_answer *answer = add_answer(list);
+        if (!answer) return SQLITE_NOMEM;
+        *answer = (rqt_answer){number, *summary};
+    }
+    return SQLITE_OK;
+}
+
+/* From the blocks that answer the rule's eps to those that answer the rule. */
+static int refine_answers(store *s, const store_terrain *t, const int32_t box[4], rqt_outline outline,
+                          const rqt_rule *rule, answer_list *list, char **error) {
+    size_t kept = 0;
+    for (size_t i = 0; i < list->count; i++) {
+        const rqt_answer answer = list->rows[i];
+        rqt_block_place p;
+        (void)rqt_block_locate(&t->lattice, t->k, answer.number, &p);
+        if (rqt_rule_is_answered(rule, &p, &answer.summary, outline)) {
+            list->rows[kept++] = answer;
+            continue;
+        }
+        const int code = add_children(s, t, &p, box, list, error);
+        if (code != SQLITE_OK) return code;
+    }
+    list->count = kept;
+    return SQLITE_OK;
 }
 
 typedef struct reading {
@@ -100,12 +147,27 @@ typedef struct reading {
     int code;
 } reading;
 
-int64_t store_count_selected(const rqt_query *query, const rqt_block *block) {
-    const size_t n = ((size_t)1 << block->k) + 1;
+int64_t store_count_selected(const rqt_query *query, rqt_block_number number, const rqt_block *block) {
+    const int32_t n = (1 << block->k) + 1;
+    rqt_block_place p;
     int64_t count = 0;
-    for (size_t i = 0; i < n * n; i++)
-        count += block->error[i] > query->eps ||
-                 (query->outline == RQT_OUTLINE_EXACT && (block->flags[i] & RQT_OUTLINE));
+    if (rqt_block_locate(&query->lattice, query->k, number, &p) != RQT_OK) return 0;
+    for (int32_t i = 0; i < n * n; i++) {
+        const rqt_vertex at = {p.x + i % n * p.stride, p.y + i / n * p.stride};
+        count += rqt_query_selects(query, at, block->error[i], block->flags[i]);
+    }
+    return count;
+}
+
+static int64_t count_corners(const rqt_query *query, const rqt_answer *answer) {
+    rqt_block_place p;
+    int64_t count = 0;
+    if (rqt_block_locate(&query->lattice, query->k, answer->number, &p) != RQT_OK) return 0;
+    for (int c = 0; c < 4; c++) {
+        const rqt_vertex at = {p.x + (c & 1 ? p.side : 0), p.y + (c & 2 ? p.side : 0)};
+        const rqt_summary_vertex *v = &answer->summary.corner[c];
+        count += rqt_query_selects(query, at, v->error, v->flags);
+    }
     return count;
 }
 
@@ -115,14 +177,10 @@ int store_begin_reads(const rqt_query *query, store_reads *reads) {
     if (!reads->rows) return SQLITE_NOMEM;
     reads->count = query->answer_count;
     for (size_t i = 0; i < reads->count; i++) {
-        const rqt_summary *summary = &query->answers[i].summary;
-        int64_t selected = 0;
-        for (int c = 0; c < 4; c++)
-            selected += summary->corner[c].error > query->eps ||
-                        (query->outline == RQT_OUTLINE_EXACT && (summary->corner[c].flags & RQT_OUTLINE));
-        const bool outside = !rqt_query_needs_block(query, &query->answers[i]) &&
-                             rqt_summary_needs_block(summary, query->outline, query->eps);
-        reads->rows[i] = (store_read){.number = query->answers[i].number, .outside = outside, .selected = selected};
+        const rqt_answer *answer = &query->answers[i];
+        const bool outside = !rqt_query_needs_block(query, answer) && rqt_query_selects_inside(query, answer);
+        reads->rows[i] =
+            (store_read){.number = answer->number, .outside = outside, .selected = count_corners(query, answer)};
     }
     return SQLITE_OK;
 }
@@ -150,7 +208,7 @@ static const rqt_block *read_block(void *context, rqt_block_number number) {
                                 .needs_bytes = true,
                                 .cached = read == 0,
                                 .bytes = size,
-                                .selected = store_count_selected(r->query, block)};
+                                .selected = store_count_selected(r->query, number, block)};
         }
     }
     return block;
@@ -191,11 +249,14 @@ int store_query_tables(store *s, const store_terrain *t, store_question *questio
     answer_list list = {0};
     char *sentence = NULL;
     int code = find_answers(s, t, box, options->outline, code_eps, &list, &sentence);
+    if (code == SQLITE_OK && options->rule)
+        code = refine_answers(s, t, box, options->outline, options->rule, &list, &sentence);
     if (code == SQLITE_OK) {
         rqt_query query = {.lattice = t->lattice,
                            .k = t->k,
                            .region = question->region,
                            .eps = code_eps,
+                           .rule = options->rule,
                            .select = options->select,
                            .outline = options->outline,
                            .wants_leaves = options->wants_leaves,

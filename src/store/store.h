@@ -77,7 +77,10 @@ typedef struct store_query_options {
     rqt_outline outline;
     rqt_metric metric;   /* exact is what is stored; minimal may be; the others are computed, see methods.c */
     rqt_product product; /* what the patch holds */
-    bool wants_leaves;   /* fill patch->leaves; with RQT_PRODUCT_TRIANGLES only */
+    /* NULL, or what else selects: the store sets its eps. Only for metrics whose mesh stays right when vertices are
+     * added: exact, local, wedgie, euclid; minimal is SQLITE_ERROR. */
+    rqt_rule *rule;
+    bool wants_leaves; /* fill patch->leaves; with RQT_PRODUCT_TRIANGLES only */
 } store_query_options;
 
 /* One row per block that answered, in Morton order. */
@@ -105,6 +108,8 @@ int store_query(store *s, const store_terrain *t, const rqt_region *region, doub
 int store_query_within(store *s, const store_terrain *t, const rqt_region *region, double eps,
                        const store_query_options *options, int64_t max_vertices, double *achieved, rqt_patch *patch,
                        store_reads *reads, char **error);
+/* Was sqlite3_interrupt called? *code says how to end. */
+bool store_is_interrupted(store *s, int *code);
 /* Instead of rqt_patch_free: the store keeps the memory for its next query, up to a limit. */
 void store_keep(store *s, rqt_patch *patch);
 /* Memory that a metric which is not stored may take, heights included. */
@@ -113,6 +118,10 @@ void store_limit_methods(store *s, size_t bytes);
 /* Full-resolution samples of a window inside the raster, for width*height values each, row by row. */
 int store_window(store *s, const store_terrain *t, int32_t col, int32_t row, int32_t width, int32_t height,
                  int32_t *q, uint8_t *valid, char **error);
+/* Unit normals of the terrain at the vertices of a patch, from the full-resolution samples around each (normals.c
+ * has the definition): x east, y north, z up, three floats a vertex, released with sqlite3_free. Vertices have to
+ * be samples of the raster. */
+int store_normals(store *s, const store_terrain *t, const rqt_patch *patch, float **normals, char **error);
 /* Height in metres at CRS coordinates on the mesh of eps (eps < 0: full resolution). *found = false over void or
  * outside. */
 int store_height(store *s, const store_terrain *t, double x, double y, double eps, double *metres, bool *found,
@@ -128,6 +137,9 @@ typedef struct store_finding {
 int store_check(store *s, const store_terrain *t, bool (*tell)(void *context, const store_finding *finding),
                 void *context, char **error);
 
+/* How many samples of the terrain were no data: [0] STORE_FILLED, [1] STORE_SEA. */
+int store_fill_counts(store *s, const store_terrain *t, int64_t counts[2], char **error);
+
 /* ---------------------------------------------------------------------------------------------- writing */
 /* Create what a new, empty database needs: a GeoPackage (application id, core tables). Harmless on one that is a
  * GeoPackage already; leaves every other database as it is. Inside the caller's transaction. */
@@ -141,6 +153,10 @@ int store_writer_begin(sqlite3 *db, const store_terrain *info, bool replace, sto
 /* One block, in ascending order of number. */
 int store_writer_block(store_writer *w, rqt_block_number number, const rqt_summary *summary, const uint8_t *bytes,
                        size_t size, char **error);
+/* Samples first .. last of a row, which were no data: STORE_FILLED between neighbours, STORE_SEA. Runs come in the
+ * order of rows, and of columns in them. */
+enum { STORE_FILLED = 1, STORE_SEA = 2 };
+int store_writer_fill(store_writer *w, int32_t row, int32_t first, int32_t last, int kind, char **error);
 /* Mark the terrain complete. */
 int store_writer_finish(store_writer *w, rqt_code max_error, char **error);
 /* Release, finished or not. */

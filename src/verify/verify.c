@@ -13,13 +13,17 @@ static bool corner_is_sound(const verify_samples *samples, const verify_corner *
     return col >= 0 && col < samples->width && row >= 0 && row < samples->height;
 }
 
-static bool input_is_sound(const verify_samples *samples, const verify_triangle *triangles, size_t n) {
+bool verify_samples_are_sound(const verify_samples *samples) {
     if (samples->width < 0 || samples->height < 0) return false;
     /* So that every column and row of the window is an int32_t, as is_promised is given them. */
     if ((int64_t)samples->col0 + samples->width > INT32_MAX) return false;
     if ((int64_t)samples->row0 + samples->height > INT32_MAX) return false;
     if (samples->q == NULL && samples->width > 0 && samples->height > 0) return false;
-    if (!isfinite(samples->quantum) || samples->quantum <= 0) return false;
+    return isfinite(samples->quantum) && samples->quantum > 0;
+}
+
+static bool input_is_sound(const verify_samples *samples, const verify_triangle *triangles, size_t n) {
+    if (!verify_samples_are_sound(samples)) return false;
     if (triangles == NULL && n > 0) return false;
     for (size_t t = 0; t < n; t++) {
         for (int k = 0; k < 3; k++) {

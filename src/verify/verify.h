@@ -80,6 +80,26 @@ typedef enum verify_status {
 verify_status verify_mesh(const verify_samples *samples, const verify_triangle *triangles, size_t n,
                           verify_report *report);
 
+/* The same for meshes whose vertices lie between samples, as clipping makes them. Places are doubles and taken at
+ * their word: turning, overlaps, T-junctions and which samples a triangle covers are exact, and need all places to
+ * be multiples of one power of two (below 2^53 of it; else VERIFY_INVALID). Heights are doubles, and so is what is
+ * computed of them: a deviation counts less VERIFY_FREE_ROUNDING quanta, which is what rounding may make of a
+ * sample that lies on its plane. twice_area is rounded to whole cells, area is not. */
+typedef struct verify_free_corner {
+    double col, row; /* sample coordinates, |col|, |row| < 2^21 */
+    double q;        /* height in quanta, |q| < 2^30 */
+} verify_free_corner;
+
+typedef struct verify_free_triangle {
+    verify_free_corner corner[3];
+} verify_free_triangle;
+
+#define VERIFY_FREE_ROUNDING 0x1p-20
+
+/* As verify_mesh. Time: in step with the samples in all triangles and the cells along all edges. */
+verify_status verify_free_mesh(const verify_samples *samples, const verify_free_triangle *triangles, size_t n,
+                               verify_report *report);
+
 #ifdef __cplusplus
 }
 #endif

@@ -216,14 +216,13 @@ static double nearest_product(verify_uwide numerator, uint64_t denominator, doub
     return ldexp((double)((uint64_t)whole | (uint64_t)cut), exponent);
 }
 
-static void summarise(const measurement *m, verify_report *report) {
-    const verify_samples *s = m->samples;
+void verify_sum_deviations(const verify_samples *s, const double *deviations, verify_report *report) {
     double sum = 0;
     size_t index = 0;
     for (int32_t row = 0; row < s->height; row++) {
         double row_sum = 0; /* by rows, so that a large total does not swallow small squares */
         for (int32_t col = 0; col < s->width; col++, index++) {
-            double deviation = m->deviation[index];
+            double deviation = deviations[index];
             bool covered = deviation >= 0;
             if (s->is_promised != NULL && s->is_promised(s->context, s->col0 + col, s->row0 + row) && !covered) {
                 report->uncovered++;
@@ -234,12 +233,18 @@ static void summarise(const measurement *m, verify_report *report) {
         }
         sum += row_sum;
     }
+    if (report->samples > 0) report->rms_error = sqrt(sum / (double)report->samples) * s->quantum;
+}
+
+static void summarise(const measurement *m, verify_report *report) {
+    const verify_samples *s = m->samples;
+    verify_sum_deviations(s, m->deviation, report);
     if (report->samples == 0) return;
     report->max_error = nearest_product(m->worst.numerator, m->worst.denominator, s->quantum);
     report->worst_col = (int32_t)(s->col0 + (int64_t)(m->worst.index % (size_t)s->width));
     report->worst_row = (int32_t)(s->row0 + (int64_t)(m->worst.index / (size_t)s->width));
     /* A mean is no more than the maximum; rounding alone could make it so when all deviations are equal. */
-    report->rms_error = fmin(sqrt(sum / (double)report->samples) * s->quantum, report->max_error);
+    report->rms_error = fmin(report->rms_error, report->max_error);
 }
 
 verify_status verify_measure_error(const verify_samples *samples, const verify_triangle *triangles, size_t n,

@@ -26,6 +26,9 @@ static inline int64_t verify_cross(const verify_corner *a, const verify_corner *
            ((int64_t)c->col - a->col) * ((int64_t)b->row - a->row);
 }
 
+/* Is the window one that verify.h allows? */
+bool verify_samples_are_sound(const verify_samples *samples);
+
 /* Fills samples, max_error, rms_error, worst_col, worst_row and uncovered. */
 verify_status verify_measure_error(const verify_samples *samples, const verify_triangle *triangles, size_t n,
                                    verify_report *report);
@@ -33,6 +36,22 @@ verify_status verify_measure_error(const verify_samples *samples, const verify_t
 /* Fills vertices, void_touched and t_junctions. */
 verify_status verify_measure_cracks(const verify_samples *samples, const verify_triangle *triangles, size_t n,
                                     verify_report *report);
+
+/* The unit squares of a triangle's box, ends included and counted from VERIFY_GRID_ORIGIN. Boxes whose open insides
+ * are apart share none, so triangles that merely touch along a line of the grid are never compared. */
+enum { VERIFY_GRID_ORIGIN = -(1 << 21) }; /* no corner is west or north of it */
+typedef struct verify_box {
+    uint32_t west, north, east, south; /* west > east: the triangle has no area, and meets nothing */
+} verify_box;
+
+/* Counts the pairs of triangles that `meet` confirms, of those whose boxes do; up to VERIFY_COUNT_CAP. */
+verify_status verify_count_pairs(const verify_box *boxes, size_t n,
+                                 bool (*meet)(const void *context, size_t a, size_t b), const void *context,
+                                 uint64_t *found);
+
+/* What deviations say, one per sample of the window in quanta, below zero where it is in no triangle: fills
+ * samples, uncovered and rms_error. */
+void verify_sum_deviations(const verify_samples *samples, const double *deviation, verify_report *report);
 
 /* Fills overlaps. */
 verify_status verify_measure_overlaps(const verify_triangle *triangles, size_t n, verify_report *report);

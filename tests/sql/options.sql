@@ -4,7 +4,19 @@ SELECT count(*) FROM rqt_triangles(NULL, 1, NULL, '{}');
 --> 4
 SELECT count(*) FROM rqt_triangles(NULL, 1, NULL, ' { "mode" : "cover" } ');
 --> 4
+SELECT count(*) FROM rqt_triangles(NULL, 1, NULL, '{"mode":"border"}');
+--> 4
+SELECT count(*) FROM rqt_triangles(NULL, 9, NULL, '{"detail":[]}');
+--> 2
+SELECT count(*) FROM rqt_triangles(NULL, 9, NULL, '{"detail":[["POINT(0 0)", 1]]}');
+--> 4
 SELECT count(*) FROM rqt_triangles(NULL, 1, NULL, '{"outline":"exact"}');
+--> 4
+SELECT count(*) FROM rqt_triangles(NULL, 1, NULL, '{"outline":"tol"}');
+--> 4
+SELECT count(*) FROM rqt_triangles(NULL, 1, NULL, '{"mode":"snap"}');
+--> 4
+SELECT count(*) FROM rqt_triangles(NULL, 1, NULL, '{"mode":"cut"}');
 --> 4
 SELECT count(*) FROM rqt_triangles(NULL, 1, NULL, '{"metric":"exact"}');
 --> 4
@@ -52,6 +64,35 @@ SELECT max(achieved_eps) FROM rqt_explain(NULL, 1, NULL, '{"max_vertices":4}');
 --> 8.0
 SELECT rqt_mesh(NULL, 0, 'indexed', NULL, '{"max_vertices":4}') = rqt_mesh(NULL, 8, 'indexed');
 --> 1
+
+-- mode cut: vertices between samples, heights on the leaf's plane; the faces of the tent rise by 4 a sample
+SELECT x, y, z, error, level FROM rqt_range('POLYGON((1 -1.5, 1.5 -1.5, 1.5 -2.5, 1 -2.5, 1 -1.5))', 1, NULL, '{"mode":"cut"}') ORDER BY x, y;
+--> 1.0|-2.5|4.0|0.0|NULL
+--> 1.0|-1.5|4.0|0.0|NULL
+--> 1.5|-2.5|6.0|0.0|NULL
+--> 1.5|-1.5|6.0|0.0|NULL
+SELECT samples, vertices, triangles, max_error, t_junctions, overlaps, uncovered, area FROM rqt_verify('POLYGON((1 -1, 3 -1, 3 -3, 1 -3, 1 -1))', 1, NULL, '{"mode":"cut"}');
+--> 9|5|4|0.0|0|0|0|4.0
+SELECT col, row, q FROM rqt_range('POLYGON((2 -2, 0.5 -2, 2 -0.5, 2 -2))', 1, NULL, '{"mode":"cut"}') ORDER BY col, row;
+--> 0.5|2.0|2.0
+--> 1.25|1.25|5.0
+--> 2.0|0.5|2.0
+--> 2|2|8
+SELECT count(*) FROM rqt_strip('POLYGON((2 -2, 0.5 -2, 2 -0.5, 2 -2))', 1, NULL, '{"mode":"cut"}');
+--> 4
+-- lines and points cannot be cut out: whole leaves
+SELECT area FROM rqt_verify('LINESTRING(1 -1.5, 1 -2.5)', 1, NULL, '{"mode":"cut"}');
+--> 4.0
+SELECT rqt_mesh(NULL, 1, 'strip', NULL, '{"mode":"cut"}');
+--! rqt_mesh(): format "strip" holds whole samples, and mode "cut" has vertices between them
+SELECT rqt_mesh(NULL, 1, 'indexed', NULL, '{"mode":"cut"}');
+--! rqt_mesh(): format "indexed" holds whole samples
+SELECT rqt_mesh(NULL, 1, 'rqt', NULL, '{"mode":"cut"}');
+--! rqt_mesh(): format "rqt" holds whole samples
+SELECT * FROM rqt_range(NULL, 1, NULL, '{"mode":"cut","max_vertices":5}');
+--! rqt_range(): option "max_vertices" does not go with mode "cut"
+SELECT * FROM rqt_strip(NULL, 1, NULL, '{"mode":"cut","strip":"fan"}');
+--! rqt_strip(): option "strip":"fan" does not go with mode "cut"
 SELECT * FROM rqt_range(NULL, 1, NULL, '{"max_vertices":3}');
 --! rqt_range(): option "max_vertices" must be an integer of 4 or more
 SELECT * FROM rqt_range(NULL, 1, NULL, '{"max_vertices":4.5}');
@@ -60,22 +101,10 @@ SELECT * FROM rqt_range(NULL, 1, NULL, '{"max_vertices":"5"}');
 --! rqt_range(): option "max_vertices" must be an integer of 4 or more
 
 -- of the contract, not yet here
-SELECT * FROM rqt_range(NULL, 1, NULL, '{"mode":"snap"}');
---! rqt_range(): option "mode":"snap" is not in this version
-SELECT * FROM rqt_strip(NULL, 1, NULL, '{"mode":"border"}');
---! rqt_strip(): option "mode":"border" is not in this version
-SELECT * FROM rqt_verify(NULL, 1, NULL, '{"mode":"cut"}');
---! rqt_verify(): option "mode":"cut" is not in this version
-SELECT rqt_mesh(NULL, 1, 'obj', NULL, '{"outline":"tol"}');
---! rqt_mesh(): option "outline":"tol" is not in this version
-SELECT rqt_mesh(NULL, 1, 'obj', NULL, '{"detail":5}');
---! rqt_mesh(): option "detail" is not in this version
 SELECT * FROM rqt_triangles(NULL, 1, NULL, '{"max_triangles":100}');
 --! rqt_triangles(): option "max_triangles" is not in this version
 SELECT * FROM rqt_range(NULL, 1, NULL, '{"previous":"x"}');
 --! rqt_range(): option "previous" is not in this version
-SELECT * FROM rqt_strip(NULL, 1, NULL, '{"frame":null}');
---! rqt_strip(): option "frame" is not in this version
 SELECT * FROM rqt_verify(NULL, 1, NULL, '{"test":{}}');
 --! rqt_verify(): option "test" is not in this version
 

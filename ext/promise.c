@@ -1,0 +1,137 @@
+/* promise.c - what an outline promises.
+ *
+ * Outline `exact`: a sample inside the region is promised when it is a corner of a unit half cell with three valid
+ * corners.
+ *
+ * Outline `tol`: of these, the samples from which every void is further than `reach` in columns or in rows, where
+ * reach is the largest extent whose cost, extent * cell / c metres as a code, is not above the code of eps. So the
+ * outline moves by at most reach * cell <= c * eps metres of ground, along either axis. Proof. Let s be a corner of
+ * the valid unit half cell h, and T the leaf that holds h. If T is kept, s is covered. Else T has a void corner v;
+ * so T is not h, but larger, and has a split vertex, which is not selected: its error is not above eps. But T holds
+ * s, which is valid, and v, which is not: it is mixed, and the error of its split vertex is at least the cost of
+ * T's extent. So the extent of T is at most reach; and s and v lie in T's box. Every metric counts mixed triangles
+ * so (METHODS.md), and a selection by anything larger only has more vertices.
+ *
+ * Voids are looked for as far as MOST_REACH samples; where reach is more, they are taken to be just beyond.
+ */
+#include "promise.h"
+
+#include <string.h>
+
+#define MOST_REACH 1024
+
+static bool is_valid(const promise *p, int32_t col, int32_t row) {
+    if (col < p->col || row < p->row || col >= p->col + p->width || row >= p->row + p->height) return false;
+    return p->valid[(size_t)(row - p->row) * (size_t)p->width + (size_t)(col - p->col)] != 0;
+}
+
+/* The largest extent, in samples, that eps allows a mixed leaf. */
+static int32_t reach_of(const request *r) {
+    const store_terrain *t = r->terrain;
+    if (r->options.outline != RQT_OUTLINE_TOL || t->voids == 0) return 0;
+    const rqt_code eps = rqt_code_eps(r->achieved_eps, t->quantum_error);
+    int32_t low = 0, high = (1 << t->lattice.K) + 1; /* low is allowed, high is too much or cannot be */
+    while (high - low > 1) {
+        const int32_t middle = low + (high - low) / 2;
+        if (rqt_code_from_ground(middle, t->cost.cell, t->cost.c) <= eps)
+            low = middle;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+static int count_voids(promise *p) {
+    const size_t across = (size_t)p->width + 1;
+    p->voids = sqlite3_malloc64(across * ((size_t)p->height + 1) * sizeof *p->voids);
+    if (!p->voids) return SQLITE_NOMEM;
+    memset(p->voids, 0, across * sizeof *p->voids);
+    for (size_t y = 0; y < (size_t)p->height; y++) {
+        uint32_t *above = p->voids + y * across, *here = above + across, row = 0;
+        here[0] = 0;
+        for (size_t x = 0; x < (size_t)p->width; x++) {
+            row += !p->valid[y * (size_t)p->width + x];
+            here[x + 1] = above[x + 1] + row;
+        }
+    }
+    return SQLITE_OK;
+}
+
+int promise_begin(promise *p, const request *r, const int32_t box[4], char **error) {
+    const rqt_lattice *lattice = &r->terrain->lattice;
+    const int32_t reach = reach_of(r), around = reach < MOST_REACH ? reach + 1 : MOST_REACH;
+    const int32_t last_col = lattice->width - 1, last_row = lattice->height - 1;
+    const int32_t x0 = box[0] > around ? box[0] - around : 0, y0 = box[1] > around ? box[1] - around : 0,
+                  x1 = last_col - box[2] > around ? box[2] + around : last_col,
+                  y1 = last_row - box[3] > around ? box[3] + around : last_row;
+    *p = (promise){.col = x0,
+                   .row = y0,
+                   .width = x1 - x0 + 1,
+                   .height = y1 - y0 + 1,
+                   .region = r->region,
+                   .reach = reach,
+                   .ends = {x0 == 0, y0 == 0, x1 == last_col, y1 == last_row}};
+    const sqlite3_uint64 samples = (sqlite3_uint64)p->width * (sqlite3_uint64)p->height;
+    p->q = sqlite3_malloc64(samples * sizeof *p->q);
+    p->valid = sqlite3_malloc64(samples);
+    int code = p->q && p->valid ? SQLITE_OK : SQLITE_NOMEM;
+    if (code == SQLITE_OK)
+        code = store_window(r->store, r->terrain, p->col, p->row, p->width, p->height, p->q, p->valid, error);
+    if (code == SQLITE_OK && reach > 0) code = count_voids(p);
+    return code;
+}
+
+void promise_free(promise *p) {
+    sqlite3_free(p->q);
+    sqlite3_free(p->valid);
+    sqlite3_free(p->voids);
+    *p = (promise){0};
+}
+
+/* Is a void within reach, or may there be one past the window? */
+static bool is_near_void(const promise *p, int32_t col, int32_t row) {
+    const int64_t x0 = (int64_t)col - p->col - p->reach, y0 = (int64_t)row - p->row - p->reach,
+                  x1 = (int64_t)col - p->col + p->reach + 1, y1 = (int64_t)row - p->row + p->reach + 1;
+    const bool past[4] = {x0<0, y0<0, x1> p->width, y1> p->height};
+    for (int i = 0; i < 4; i++)
+        if (past[i] && !p->ends[i]) return true;
+    const size_t across = (size_t)p->width + 1, left = (size_t)(past[0] ? 0 : x0),
+                 right = (size_t)(past[2] ? p->width : x1);
+    const uint32_t *above = p->voids + (size_t)(past[1] ? 0 : y0) * across,
+                   *below = p->voids + (size_t)(past[3] ? p->height : y1) * across;
+    return below[right] - below[left] - above[right] + above[left] > 0;
+}
+
+static bool is_in_half_cell(const promise *p, int32_t col, int32_t row) {
+    for (int cell = 0; cell < 4; cell++) {
+        const int32_t x = col - (cell & 1), y = row - (cell >> 1); /* the cell's north-west corner */
+        const bool nw = is_valid(p, x, y), ne = is_valid(p, x + 1, y), sw = is_valid(p, x, y + 1),
+                   se = is_valid(p, x + 1, y + 1);
+        const int voids = !nw + !ne + !sw + !se;
+        if (voids == 0) return true;
+        if (voids > 1) continue;
+        /* With one void corner, the half without it survives if that corner is off the diagonal; its three corners
+         * are then all the valid ones, this sample among them. */
+        const bool main_diagonal = ((x + y) & 1) == 0;
+        if (main_diagonal ? nw && se : ne && sw) return true;
+    }
+    return false;
+}
+
+bool promise_holds(void *context, int32_t col, int32_t row) {
+    const promise *p = context;
+    if (!is_valid(p, col, row) || !rqt_region_contains(p->region, (rqt_vertex){col, row})) return false;
+    return is_in_half_cell(p, col, row) && (p->reach == 0 || !is_near_void(p, col, row));
+}
+
+int64_t promise_half_cells(const promise *p) {
+    int64_t count = 0;
+    for (int32_t y = p->row; y < p->row + p->height - 1; y++)
+        for (int32_t x = p->col; x < p->col + p->width - 1; x++) {
+            const bool nw = is_valid(p, x, y), ne = is_valid(p, x + 1, y), sw = is_valid(p, x, y + 1),
+                       se = is_valid(p, x + 1, y + 1);
+            const bool main_diagonal = ((x + y) & 1) == 0;
+            if (main_diagonal ? nw && se : ne && sw) count += main_diagonal ? ne + sw : nw + se;
+        }
+    return count;
+}

@@ -1,0 +1,27 @@
+/* promise.h - the window that a proof looks at, and which of its samples the mesh has promised to cover. promise.c
+ */
+#ifndef RQT_PROMISE_H
+#define RQT_PROMISE_H
+
+#include "functions.h"
+
+typedef struct promise {
+    int32_t col, row, width, height; /* of the window */
+    int32_t *q;
+    uint8_t *valid;
+    const rqt_region *region;
+    int32_t reach;   /* outline tol: samples this near to a void are not promised; 0: all are */
+    bool ends[4];    /* the window's west, north, east, south is the raster's */
+    uint32_t *voids; /* (width + 1) * (height + 1): voids north-west of each; NULL when reach is 0 */
+} promise;
+
+/* The samples of a box (both ends included) and around it what the promise depends on. Releases nothing on failure
+ * that promise_free would not. */
+int promise_begin(promise *p, const request *r, const int32_t box[4], char **error);
+void promise_free(promise *p);
+/* For verify_samples; context: a promise. */
+bool promise_holds(void *context, int32_t col, int32_t row);
+/* Unit half cells with three valid corners in the window: what the outline `exact` covers, no more and no less. */
+int64_t promise_half_cells(const promise *p);
+
+#endif
