@@ -209,7 +209,7 @@ check-docs: ## fail when ext/SQL.md, the README's session or the list of fuzzers
 	@./tests/check_fuzz.sh
 
 # ---------------------------------------------------------------------------------------------------- benches
-.PHONY: bench bench-data bench-table1 chart peers
+.PHONY: bench bench-data bench-update bench-table1 chart peers
 bench: ## speed and size beside GDAL's, medians of five and more
 	@./src/install-packages.sh build test
 	@$(MAKE) --no-print-directory -j2 products
@@ -218,6 +218,11 @@ bench-data: ## real DEMs of DATA=dir: database beside COG, bits of every part, t
 	@./src/install-packages.sh build test
 	@$(MAKE) --no-print-directory -j2 products
 	@BUILD=$(BUILD) ./tests/bench/bench_data.sh $(DATA)
+bench-update: ## what an update of 64 x 64 samples costs in a copy of DATABASE=file
+	@$(MAKE) --no-print-directory -j2 products $(BUILD)/tests/libtest.a
+	@mkdir -p $(BUILD)/bench && cp "$(DATABASE)" $(BUILD)/bench/update.gpkg
+	@$(CC) -std=gnu11 -O3 -DSQLITE_CORE $(WARNINGS) -Isrc/core -Isrc/store tests/bench/bench_update.c -o $(BUILD)/bench/bench_update $(BUILD)/tests/libtest.a $(LIBS_EXT) -lsqlite3 -lstdc++
+	@$(BUILD)/bench/bench_update $(BUILD)/bench/update.gpkg; rm -f $(BUILD)/bench/update.gpkg
 bench-table1: ## share of vertices over eps beside the paper's table 1
 	@./src/install-packages.sh build test
 	@$(MAKE) --no-print-directory -j2 products

@@ -368,7 +368,7 @@ static void F40_an_update_equals_a_build_for_every_small_extent(void **state) {
 static void voids_at_the_raster_s_edge_are_built_alike(void **state) {
     (void)state;
     random_begin(__func__);
-    for (int round = 0; round < 120; round++) {
+    for (int round = 0; round < 400; round++) {
         raster r = raster_make(round % 2 ? SURFACE_HILLS : SURFACE_CLIFF, random_between(17, 40),
                                random_between(17, 40), 0);
         raster_add_lake(&r);

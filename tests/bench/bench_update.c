@@ -102,13 +102,14 @@ int main(int argc, char **argv) {
         update(db, col, row, side, q, what);
         update(db, col, row, side, old, what);
     }
-    printf("%d x %d, %d x %d samples, %d updates (median, most):\n", width, height, side, side, figures);
+    printf("%d x %d, %d x %d samples, %d updates (least, median, most):\n", width, height, side, side, figures);
     static const char *const name[FIGURES] = {
         "ms update",      "ms of processor", "ms commit",        "blocks read",
         "blocks written", "summaries",       "samples measured", "cells"};
     for (int f = 0; f < FIGURES; f++) {
         qsort(figure[f], (size_t)figures, sizeof **figure, compare);
-        printf("  %-18s %10.2f %10.2f\n", name[f], figure[f][figures / 2], figure[f][figures - 1]);
+        printf("  %-18s %10.2f %10.2f %10.2f\n", name[f], figure[f][0], figure[f][figures / 2],
+               figure[f][figures - 1]);
         free(figure[f]);
     }
     store_close(s);
