@@ -73,10 +73,10 @@ $(BUILD)/%.o: src/%.c
 $(BUILD)/core/error_kernels.o: WARNINGS += -Wno-psabi
 
 # The SQL that a person can read is the SQL that the program runs.
-$(BUILD)/generated/schema_sql.h: sql/schema.sql sql/terrain.sql sql/geopackage.sql
+$(BUILD)/generated/schema_sql.h: sql/schema.sql sql/terrain.sql sql/fill.sql sql/geopackage.sql
 	@mkdir -p $(@D)
-	@for f in schema terrain geopackage; do \
-	  printf 'static const char sql_%s[] =\n' $$f; \
+	@for f in schema terrain fill geopackage; do \
+	  printf '__attribute__((unused)) static const char sql_%s[] =\n' $$f; \
 	  sed -e '/^--/d' -e 's/\\/\\\\/g' -e 's/"/\\"/g' -e 's/^/    "/' -e 's/$$/\\n"/' sql/$$f.sql; printf '    ;\n'; \
 	done > $@
 
@@ -101,23 +101,68 @@ $(BUILD)/tests/test_%.o: tests/test_%.c $(GENERATED)
 	@mkdir -p $(@D)
 	@echo "  compile $<"; $(CC) $(CFLAGS) $(INCLUDES) -Itests -DSQLITE_CORE $(GDAL_CFLAGS) -c $< -o $@
 $(BUILD)/tests/test_%: $(BUILD)/tests/test_%.o $(BUILD)/tests/libtest.a
-	@$(CXX) $(SANITIZE) -o $@ $^ $(LIBS_TEST)
+	@$(CXX) $(SANITIZE) $(LINK_TEST) -o $@ $^ $(LIBS_TEST)
+# Its own malloc stands before ours, and can say no.
+$(BUILD)/tests/test_fault_memory: LINK_TEST = -Wl,--wrap=malloc,--wrap=calloc,--wrap=realloc
 
-.PHONY: test-programs test test-quick test-sanitize
+# Fuzzers are linked to a driver of their own for the tests, to libFuzzer for `make fuzz`.
+FUZZERS = $(patsubst tests/fuzz/%.c,%,$(wildcard tests/fuzz/fuzz_*.c))
+FUZZ_DRIVER = $(BUILD)/tests/fuzz/driver.o
+$(BUILD)/tests/fuzz/%.o: tests/fuzz/%.c $(GENERATED)
+	@mkdir -p $(@D)
+	@echo "  compile $<"; $(CC) $(CFLAGS) $(INCLUDES) -DSQLITE_CORE -c $< -o $@
+$(BUILD)/tests/fuzz/fuzz_%: $(BUILD)/tests/fuzz/fuzz_%.o $(FUZZ_DRIVER) $(BUILD)/tests/libtest.a
+	@$(CXX) $(SANITIZE) $(LINK_FUZZ) -o $@ $^ $(LIBS_TEST)
+
+.PHONY: test-programs fuzz-programs test test-quick
 test-programs: $(TEST_PROGRAMS)
+	@:
+fuzz-programs: $(FUZZERS:%=$(BUILD)/tests/fuzz/%)
 	@:
 
 test: ## install, build, and pass every test (also under ASan and UBSan)
 	@./src/install-packages.sh build test
 	@$(MAKE) --no-print-directory -j2 products test-programs
 	@$(MAKE) --no-print-directory -j2 BUILD=$(BUILD)/sanitized OPTIMIZE=-O1 \
-	  SANITIZE="-fsanitize=address,undefined -fno-sanitize-recover=undefined" products test-programs
+	  SANITIZE="-fsanitize=address,undefined -fno-sanitize-recover=undefined" products test-programs fuzz-programs
 	@BUILD=$(BUILD) ./tests/run.sh
 
 test-quick: ## the tests without the sanitized build
 	@./src/install-packages.sh build test
 	@$(MAKE) --no-print-directory -j2 products test-programs
 	@BUILD=$(BUILD) ./tests/run.sh quick
+
+.PHONY: test-qgis
+test-qgis: ## install QGIS, and open and draw in it, without a screen, what rqt writes: pictures in build/qgis
+	@./src/install-packages.sh build test qgis
+	@$(MAKE) --no-print-directory -j2 products
+	@RQT=$(BUILD)/rqt RQT_SO=$(BUILD)/rqt.so /usr/bin/python3 tests/qgis/test_qgis.py $(BUILD)/qgis
+
+# The test programs alone, which know the core best: what only a script reaches counts as missed.
+.PHONY: coverage
+coverage: ## the test programs in a build that counts: the core's lines, 100 % but for those of tests/coverage.txt
+	@./src/install-packages.sh build test
+	@$(MAKE) --no-print-directory -j2 BUILD=$(BUILD)/coverage OPTIMIZE=-O1 WARNINGS=-w SANITIZE=--coverage test-programs
+	@find $(BUILD)/coverage -name '*.gcda' -delete
+	@BUILD=$(BUILD)/coverage PROGRAMS="$(notdir $(TEST_PROGRAMS))" ./tests/run.sh programs
+	@/usr/bin/python3 tests/coverage.py $(BUILD)/coverage
+
+# What runs on several threads: readers beside a writer, the import's reader and workers, which work on sweeps and builds.
+THREADED = test_fault_threads
+.PHONY: test-threads
+test-threads: ## what runs on several threads, under ThreadSanitizer
+	@./src/install-packages.sh build test
+	@$(MAKE) --no-print-directory -j2 BUILD=$(BUILD)/threads OPTIMIZE=-O1 WARNINGS=-w SANITIZE=-fsanitize=thread $(THREADED:%=$(BUILD)/threads/tests/%)
+	@BUILD=$(BUILD)/threads PROGRAMS="$(THREADED)" ./tests/run.sh programs
+
+# clang's libFuzzer steers by what code an input reaches; what it finds stays in build/fuzz/NAME.
+SECONDS ?= 60
+.PHONY: fuzz
+fuzz: ## every fuzzer for SECONDS=60 each, steered by libFuzzer, under ASan and UBSan
+	@./src/install-packages.sh build test fuzz
+	@$(MAKE) --no-print-directory -j2 BUILD=$(BUILD)/fuzz CC=clang-14 CXX=clang++-14 OPTIMIZE=-O1 WARNINGS=-w FUZZ_DRIVER= LINK_FUZZ=-fsanitize=fuzzer \
+	  SANITIZE="-fsanitize=address,undefined,fuzzer-no-link -fno-sanitize-recover=undefined" fuzz-programs
+	@BUILD=$(BUILD) ./tests/fuzz/run.sh $(SECONDS) $(FUZZERS)
 
 .PHONY: mutants
 mutants: ## break the code in one line, many times over: each time a named test must go red
@@ -138,7 +183,7 @@ check-layers: ## modules depend one way only; librqt.a and rqt.so mention only w
 	@$(MAKE) --no-print-directory -j2 products
 	@BUILD=$(BUILD) ./tests/check_layers.sh
 
-FORMATTED = $(wildcard src/*/*.[ch] src/geo/*.cpp ext/*.[ch] tests/*.[ch] tests/bench/*.[ch] tests/bench/peers/*.[ch])
+FORMATTED = $(wildcard src/*/*.[ch] src/geo/*.cpp ext/*.[ch] tests/*.[ch] tests/fuzz/*.[ch] tests/bench/*.[ch] tests/bench/peers/*.[ch])
 .PHONY: format check-format
 format: ## lay the sources out (clang-format)
 	@./src/install-packages.sh format
@@ -147,14 +192,21 @@ check-format: ## fail when a source is not laid out
 	@./src/install-packages.sh format
 	@clang-format --dry-run -Werror $(FORMATTED) && echo "layout: all of $(words $(FORMATTED)) files"
 
+.PHONY: lint
+lint: ## clang-tidy and cppcheck: no finding
+	@./src/install-packages.sh build lint
+	@$(MAKE) --silent --no-print-directory $(GENERATED)
+	@BUILD=$(BUILD) FLAGS="$(INCLUDES) -DSQLITE_CORE $(GDAL_CFLAGS) $(CAIRO_CFLAGS)" ./tests/lint.sh
+
 .PHONY: docs check-docs
 docs: products ## write ext/SQL.md from the function table
 	@./tests/sql_reference.sh $(BUILD) > ext/SQL.md
-check-docs: ## fail when ext/SQL.md or the README's session are not what the program says
+check-docs: ## fail when ext/SQL.md, the README's session or the list of fuzzers are not what the program says
 	@./src/install-packages.sh build test
 	@$(MAKE) --no-print-directory -j2 products
 	@./tests/sql_reference.sh $(BUILD) | diff -u ext/SQL.md - && echo "ext/SQL.md is what the function table says"
 	@BUILD=$(BUILD) ./tests/check_readme.sh
+	@./tests/check_fuzz.sh
 
 # ---------------------------------------------------------------------------------------------------- benches
 .PHONY: bench bench-data bench-table1 chart peers
@@ -170,6 +222,25 @@ bench-table1: ## share of vertices over eps beside the paper's table 1
 	@./src/install-packages.sh build test
 	@$(MAKE) --no-print-directory -j2 products
 	@BUILD=$(BUILD) ./tests/bench/bench_table1.sh
+
+# What published methods give on the catalogue's inputs (tests/catalogue.txt), beside rqt.
+.PHONY: stability check-stability
+$(BUILD)/tests/stability.o: tests/bench/stability.c
+	@mkdir -p $(@D)
+	@echo "  compile $<"; $(CC) $(CFLAGS) $(INCLUDES) -Itests -c $< -o $@
+$(BUILD)/tests/stability: $(BUILD)/tests/stability.o $(BUILD)/tests/libtest.a
+	@$(CXX) $(SANITIZE) -o $@ $^ $(LIBS_TEST)
+stability: ## examples/STABILITY.md: what breaks published methods, what they give, what rqt gives
+	@./src/install-packages.sh build test
+	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/stability
+	@BUILD=$(BUILD) ./tests/bench/stability.sh examples/charts/stability.png > $(BUILD)/STABILITY.md
+	@mv $(BUILD)/STABILITY.md examples/STABILITY.md && echo "examples/STABILITY.md and its picture are written"
+check-stability: ## fail when that page is not what the code gives, or a case has no test or nothing that fails it
+	@./src/install-packages.sh build test
+	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/stability
+	@BUILD=$(BUILD) ./tests/bench/stability.sh | diff -u examples/STABILITY.md - && echo "examples/STABILITY.md is what make stability writes"
+	@./tests/check_catalogue.sh
+check-docs: check-stability
 
 chart: ## speed against accuracy, drawn: pictures in build/chart; peers from npm where there is one; DATA=dir
 	@./src/install-packages.sh build test

@@ -59,10 +59,34 @@ static int encode(const request *r, double eps, double eps_from, const answer *a
     return code;
 }
 
-int wire_mesh(request *r, uint8_t **bytes, size_t *size, char **error) {
-    answer a;
-    int code = answer_read(r, r->eps, &a, error);
+/* The normals of the patch behind its mesh. */
+static int add_normals(const request *r, const rqt_patch *patch, uint8_t **bytes, size_t *size, char **error) {
+    const size_t count = patch->vertex_count;
+    float *normals;
+    const int code = store_normals(r->store, r->terrain, patch, &normals, error);
+    if (code != SQLITE_OK) return code;
+    uint8_t *longer = sqlite3_realloc64(*bytes, *size + rqt_wire_normals_bound(count));
+    if (longer) *bytes = longer;
+    const rqt_status status =
+        longer ? rqt_wire_add_normals(normals, count, store_allocator(), *bytes, size) : RQT_NO_MEMORY;
+    sqlite3_free(normals);
+    if (status != RQT_OK) return SQLITE_NOMEM;
+    if (*size > INT32_MAX) return fail(error, "the mesh is larger than 2 GiB; ask for less or a larger eps");
+    return SQLITE_OK;
+}
+
+int wire_mesh(request *r, bool normals, uint8_t **bytes, size_t *size, char **error) {
+    answer a = {{0}, {0}};
+    int code = store_begin(r->store, error); /* mesh and normals of one state of the database */
+    if (code != SQLITE_OK) return code;
+    code = answer_read(r, r->eps, &a, error);
     if (code == SQLITE_OK) code = encode(r, r->achieved_eps, 0, &a, NULL, bytes, size, error);
+    if (code == SQLITE_OK && normals) code = add_normals(r, &a.patch, bytes, size, error);
+    store_end(r->store);
+    if (code != SQLITE_OK) {
+        sqlite3_free(*bytes);
+        *bytes = NULL;
+    }
     answer_free(&a);
     return code;
 }

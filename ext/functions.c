@@ -49,17 +49,19 @@ const function rqt_functions[] = {
      .purpose =
          "The vertices of the mesh of a region, each once. error: the stored saturated error in metres, "
          "infinite at the "
-         "root's corners; level 0 is the coarsest. Mode cut: vertices between samples have error 0 and no level.",
+         "root's corners; level 0 is the coarsest. Mode cut: vertices between samples have error 0 and no level. "
+         "gpkg: the vertex as a GeoPackage POINT Z.",
      .example = "SELECT count(*) FROM rqt_range(" SUMMIT ", 10)",
      .fill = fill_range,
-     .hidden = "col, row, q, achieved_eps"},
+     .hidden = "col, row, q, achieved_eps, gpkg"},
     {.name = "rqt_triangles",
      .arguments = MESH,
      .returns = "id, x0, y0, z0, x1, y1, z1, x2, y2, z2",
-     .purpose = "The triangles of the mesh of a region, counter-clockwise seen from above.",
+     .purpose = "The triangles of the mesh of a region, counter-clockwise seen from above. gpkg: the triangle as a "
+                "GeoPackage POLYGON Z, for layers; as a result of OGR write +gpkg AS geom.",
      .example = "SELECT count(*), max(z0) FROM rqt_triangles(" SUMMIT ", 10, NULL, '{\"mode\":\"cut\"}')",
      .fill = fill_triangles,
-     .hidden = "achieved_eps"},
+     .hidden = "achieved_eps, gpkg"},
     {.name = "rqt_strip",
      .arguments = MESH,
      .returns = "seq, x, y, z",
@@ -73,7 +75,9 @@ const function rqt_functions[] = {
      .arguments = "region, eps, format [, terrain [, options]]",
      .returns = "BLOB, TEXT for obj",
      .purpose = "The mesh of a region as a file's bytes; format: strip, indexed, rqt (src/core/FORMAT.md; rqt "
-                "takes about a byte a vertex), obj, ply, wkb, gpkg, spatialite. Of mode cut only the last five.",
+                "takes about a byte a vertex), obj, ply, wkb, gpkg, spatialite; ply+normals, rqt+normals: with the "
+                "terrain's normal at every vertex, from the full-resolution samples around it. Of mode cut and "
+                "frames only obj, ply, wkb, gpkg, spatialite.",
      .example = "SELECT length(rqt_mesh(" SUMMIT ", 10, 'ply'))",
      .call = call_mesh,
      .least = 3,

@@ -95,8 +95,8 @@ int request_patch(request *r, rqt_product product, rqt_patch *patch, store_reads
 int request_cut(request *r, rqt_cut *cut, char **error);
 /* SQLITE_OK in any other mode; else a sentence that what is asked for cannot hold the answer. cut.c */
 int request_refuse_cut(const request *r, const char *what, char **error);
-/* The patch in wire format. delta.c */
-int wire_mesh(request *r, uint8_t **bytes, size_t *size, char **error);
+/* The patch in wire format, with normals or without. delta.c */
+int wire_mesh(request *r, bool normals, uint8_t **bytes, size_t *size, char **error);
 void request_free(request *r);
 /* A geometry of the request as a region; `what` it is, for sentences. On a terrain in degrees it is one on every
  * turn that meets the terrain, for longitudes are the same modulo 360: the geometry gets more members. */
@@ -106,6 +106,8 @@ int rule_read(request *r, char **error);
 void rule_free(request *r);
 /* The request's eps, or the least of its places' when that is less. */
 double rule_least_eps(const request *r);
+/* Of the coordinates that the answer has: the terrain's, 4978 for geocentric ones, 0 for local ones. */
+int32_t request_srid(const request *r);
 /* What the option frame wants, when all else is known: the rule is given what curvature takes. frame.c */
 int frame_read(request *r, char **error);
 void frame_free(space_frame *f);

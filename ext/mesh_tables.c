@@ -25,10 +25,11 @@ static void release(void *data) {
 }
 
 /* As format_coordinates says them, but only the one. */
-static void put_coordinate(const mesh *m, uint32_t vertex, int which, sqlite3_context *result) {
+static double coordinate(const mesh *m, uint32_t vertex, int which) {
     const rqt_placement *at = &m->frame.placement;
     const rqt_unit *unit = &m->frame.unit;
     double col, row, q;
+    if (m->xyz) return m->xyz[3 * (size_t)vertex + (size_t)which];
     if (m->is_cut) {
         const rqt_cut_vertex *v = &m->cut.vertices[vertex];
         col = v->col, row = v->row, q = v->q;
@@ -36,16 +37,23 @@ static void put_coordinate(const mesh *m, uint32_t vertex, int which, sqlite3_co
         const rqt_patch_vertex *v = &m->patch.vertices[vertex];
         col = v->col, row = v->row, q = v->q;
     }
-    double value;
-    if (m->xyz)
-        value = m->xyz[3 * (size_t)vertex + (size_t)which];
-    else if (which == 0)
-        value = at->x0 + col * at->dx;
-    else if (which == 1)
-        value = at->y0 + row * at->dy;
-    else
-        value = ((double)unit->z0 + q / (double)unit->d) * m->factor + unit->offset;
-    sqlite3_result_double(result, value);
+    if (which == 0) return at->x0 + col * at->dx;
+    if (which == 1) return at->y0 + row * at->dy;
+    return ((double)unit->z0 + q / (double)unit->d) * m->factor + unit->offset;
+}
+
+static void put_coordinate(const mesh *m, uint32_t vertex, int which, sqlite3_context *result) {
+    sqlite3_result_double(result, coordinate(m, vertex, which));
+}
+
+/* A vertex as POINT Z, or the three of a triangle as POLYGON Z, in GeoPackage's bytes. */
+static void put_geometry(const mesh *m, const uint32_t *vertices, int count, sqlite3_context *result) {
+    double xyz[3][3];
+    uint8_t bytes[FORMAT_TRIANGLE_BYTES];
+    for (int i = 0; i < 3 * count; i++) xyz[i / 3][i % 3] = coordinate(m, vertices[i / 3], i % 3);
+    const size_t size = count == 1 ? format_point_gpkg(xyz[0], m->frame.srid, bytes)
+                                   : format_triangle_gpkg((const double(*)[3])xyz, m->frame.srid, bytes);
+    sqlite3_result_blob(result, bytes, (int)size, SQLITE_TRANSIENT);
 }
 
 /* The strip of a cut, where a patch has its own. */
@@ -71,7 +79,8 @@ static int make_mesh(connection *c, sqlite3_value **arguments, rqt_product produ
     code = m ? SQLITE_OK : SQLITE_NOMEM;
     if (m) {
         memset(m, 0, sizeof *m);
-        m->frame = (format_frame){.placement = r.terrain->placement, .unit = r.terrain->unit, .eps = r.eps};
+        m->frame =
+            (format_frame){.placement = r.terrain->placement, .unit = r.terrain->unit, .srid = request_srid(&r)};
         m->factor = rqt_unit_factor(&m->frame.unit);
         m->store = r.store;
         code = r.mode == REQUEST_CUT ? make_cut(&r, product, m, error)
@@ -117,6 +126,10 @@ static void cut_column(const mesh *m, size_t row, int column, sqlite3_context *r
 
 static void range_column(void *data, size_t row, int column, sqlite3_context *result) {
     const mesh *m = data;
+    if (column == 9) {
+        put_geometry(m, &(const uint32_t){(uint32_t)row}, 1, result);
+        return;
+    }
     if (m->is_cut) {
         cut_column(m, row, column, result);
         return;
@@ -150,8 +163,11 @@ static void triangles_column(void *data, size_t row, int column, sqlite3_context
     else if (column == 10)
         sqlite3_result_double(result, m->achieved_eps);
     else {
-        const uint32_t *triangles = m->is_cut ? m->cut.triangles : m->patch.triangles;
-        put_coordinate(m, triangles[3 * row + (size_t)(column - 1) / 3], (column - 1) % 3, result);
+        const uint32_t *corners = (m->is_cut ? m->cut.triangles : m->patch.triangles) + 3 * row;
+        if (column == 11)
+            put_geometry(m, corners, 3, result);
+        else
+            put_coordinate(m, corners[(column - 1) / 3], (column - 1) % 3, result);
     }
 }
 

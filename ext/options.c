@@ -82,6 +82,9 @@ static int read_one(const cJSON *item, request *r, char **error) {
 int options_read(const char *json, request *r, char **error) {
     const char *end = NULL;
     cJSON *root = cJSON_ParseWithOpts(json, &end, true);
+    /* cJSON does not tell bad text from no memory. A second try does, unless there is none for the sentence either.
+     */
+    if (!root) root = cJSON_ParseWithOpts(json, &end, true);
     if (!root) return fail(error, "options are not JSON, from here: %.40s", end ? end : json);
     int code = cJSON_IsObject(root) ? SQLITE_OK : fail(error, "options must be a JSON object");
     for (const cJSON *item = root->child; item && code == SQLITE_OK; item = item->next) {

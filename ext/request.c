@@ -90,6 +90,10 @@ int request_patch(request *r, rqt_product product, rqt_patch *patch, store_reads
     return status == RQT_OK ? SQLITE_OK : SQLITE_NOMEM;
 }
 
+int32_t request_srid(const request *r) {
+    return r->frame_kind == FRAME_CRS ? r->terrain->srid : r->frame_kind == FRAME_ECEF ? 4978 : 0;
+}
+
 void request_free(request *r) {
     frame_free(r->frame);
     rule_free(r);

@@ -94,7 +94,7 @@ static int framed_format(const request *r, rqt_patch *patch, format_kind kind, u
                               .triangles = patch->triangles,
                               .coordinates = framed_coordinates,
                               .context = xyz,
-                              .srid = r->frame_kind == FRAME_ECEF ? 4978 : 0,
+                              .srid = request_srid(r),
                               .title = frame_title(r->frame),
                               .eps = r->achieved_eps};
     if (code == SQLITE_OK) code = format_failed(format_write(&mesh, kind, store_allocator(), bytes, size), error);
@@ -102,14 +102,15 @@ static int framed_format(const request *r, rqt_patch *patch, format_kind kind, u
     return code;
 }
 
-static int other_format(const request *r, rqt_patch *patch, format_kind kind, uint8_t **bytes, size_t *size,
-                        char **error) {
+static int other_format(const request *r, rqt_patch *patch, format_kind kind, const float *normals, uint8_t **bytes,
+                        size_t *size, char **error) {
     if (r->frame) return framed_format(r, patch, kind, bytes, size, error);
     const format_frame frame = {.placement = r->terrain->placement,
                                 .unit = r->terrain->unit,
                                 .srid = r->terrain->srid,
                                 .title = r->terrain->name,
-                                .eps = r->achieved_eps};
+                                .eps = r->achieved_eps,
+                                .normals = normals};
     return format_failed(format_patch(patch, &frame, kind, store_allocator(), bytes, size), error);
 }
 
@@ -147,51 +148,83 @@ static int cut_format(request *r, format_kind kind, uint8_t **bytes, size_t *siz
     return code;
 }
 
+/* What argument `format` asks for. */
+typedef struct mesh_format {
+    enum { MESH_STRIP, MESH_INDEXED, MESH_WIRE, MESH_OTHER } family;
+    format_kind kind; /* of MESH_OTHER */
+    bool normals;
+    char name[16]; /* without "+normals"; cut where it is none of ours */
+} mesh_format;
+
+static int read_format(sqlite3_value *value, mesh_format *f, char **error) {
+    static const char *const own[] = {"strip", "indexed", "rqt"};
+    static const char with_normals[] = "+normals";
+    const char *text = sqlite3_value_type(value) == SQLITE_TEXT ? (const char *)sqlite3_value_text(value) : "";
+    if (!text) return SQLITE_NOMEM;
+    const size_t length = strlen(text), suffix = sizeof with_normals - 1;
+    const bool normals = length > suffix && strcmp(text + length - suffix, with_normals) == 0;
+    *f = (mesh_format){MESH_OTHER, FORMAT_OBJ, normals, ""};
+    sqlite3_snprintf(sizeof f->name, f->name, "%.*s", (int)(normals ? length - suffix : length), text);
+    for (int i = 0; i < 3; i++)
+        if (strcmp(f->name, own[i]) == 0) f->family = i;
+    if (strcmp(f->name, "glb") == 0) return fail(error, "format \"%s\" is not in this version", text);
+    if (f->family == MESH_OTHER && !format_from_name(f->name, &f->kind))
+        return fail(error, "unknown format \"%s\"; there are strip indexed rqt obj ply wkb gpkg spatialite", text);
+    if (f->normals && f->family != MESH_WIRE && f->kind != FORMAT_PLY)
+        return fail(error, "format \"%s\" has no normals; ply and rqt have", f->name);
+    return SQLITE_OK;
+}
+
+/* A format that is not the wire's, out of a patch. */
+static int patch_mesh(request *r, const mesh_format *f, uint8_t **bytes, size_t *size, char **error) {
+    rqt_patch patch = {0};
+    float *normals = NULL;
+    int code = store_begin(r->store, error); /* mesh and normals of one state of the database */
+    if (code != SQLITE_OK) return code;
+    code =
+        request_patch(r, f->family == MESH_STRIP ? RQT_PRODUCT_STRIP : RQT_PRODUCT_TRIANGLES, &patch, NULL, error);
+    if (code == SQLITE_OK && f->normals) code = store_normals(r->store, r->terrain, &patch, &normals, error);
+    store_end(r->store);
+    if (code == SQLITE_OK && f->family == MESH_OTHER)
+        code = other_format(r, &patch, f->kind, normals, bytes, size, error);
+    else if (code == SQLITE_OK)
+        code =
+            own_format(r, &patch, f->family == MESH_STRIP ? RQT_MESH_STRIP : RQT_MESH_INDEXED, bytes, size, error);
+    sqlite3_free(normals);
+    store_keep(r->store, &patch);
+    return code;
+}
+
 void call_mesh(sqlite3_context *result, int count, sqlite3_value **arguments) {
-    connection *c = sqlite3_user_data(result);
     char *error = NULL;
     request r = {0};
-    rqt_patch patch = {0};
+    mesh_format f;
     uint8_t *bytes = NULL;
     size_t size = 0;
-    format_kind kind = FORMAT_OBJ;
-    const char *format =
-        sqlite3_value_type(arguments[2]) == SQLITE_TEXT ? (const char *)sqlite3_value_text(arguments[2]) : "";
-    const bool strip = strcmp(format, "strip") == 0, indexed = strcmp(format, "indexed") == 0;
-    const bool wire = strcmp(format, "rqt") == 0;
-    const bool other = !strip && !indexed && !wire && format_from_name(format, &kind);
-    int code = SQLITE_OK;
-    if (strcmp(format, "glb") == 0)
-        code = fail(&error, "format \"%s\" is not in this version", format);
-    else if (!strip && !indexed && !wire && !other)
-        code =
-            fail(&error, "unknown format \"%s\"; there are strip indexed rqt obj ply wkb gpkg spatialite", format);
+    int code = read_format(arguments[2], &f, &error);
     if (code == SQLITE_OK)
-        code = request_read(c, arguments[0], arguments[1], count > 3 ? arguments[3] : NULL,
+        code = request_read(sqlite3_user_data(result), arguments[0], arguments[1], count > 3 ? arguments[3] : NULL,
                             count > 4 ? arguments[4] : NULL, &r, &error);
-    const bool cut = r.mode == REQUEST_CUT;
-    if (code == SQLITE_OK && !other) {
-        char what[40];
-        sqlite3_snprintf(sizeof what, what, "format \"%s\"", format);
+    if (code == SQLITE_OK && r.frame && f.family != MESH_OTHER)
+        code =
+            fail(&error, "format \"%s\" holds samples, not points in space: option \"frame\" must be crs", f.name);
+    if (code == SQLITE_OK && r.frame && f.normals)
+        code = fail(&error, "normals are those of the terrain's CRS: option \"frame\" must be crs");
+    if (code == SQLITE_OK && (f.family != MESH_OTHER || f.normals)) {
+        char what[60];
+        sqlite3_snprintf(sizeof what, what, "format \"%s%s\"", f.name, f.normals ? "+normals" : "");
         code = request_refuse_cut(&r, what, &error);
     }
-    if (code == SQLITE_OK && r.frame && !other)
-        code =
-            fail(&error, "format \"%s\" holds samples, not points in space: option \"frame\" must be crs", format);
-    if (code == SQLITE_OK && wire)
-        code = wire_mesh(&r, &bytes, &size, &error);
-    else if (code == SQLITE_OK && cut)
-        code = cut_format(&r, kind, &bytes, &size, &error);
+    if (code == SQLITE_OK && f.family == MESH_WIRE)
+        code = wire_mesh(&r, f.normals, &bytes, &size, &error);
+    else if (code == SQLITE_OK && r.mode == REQUEST_CUT)
+        code = cut_format(&r, f.kind, &bytes, &size, &error);
     else if (code == SQLITE_OK)
-        code = request_patch(&r, strip ? RQT_PRODUCT_STRIP : RQT_PRODUCT_TRIANGLES, &patch, NULL, &error);
-    if (code == SQLITE_OK && !wire && !cut)
-        code = other ? other_format(&r, &patch, kind, &bytes, &size, &error)
-                     : own_format(&r, &patch, strip ? RQT_MESH_STRIP : RQT_MESH_INDEXED, &bytes, &size, &error);
-    if (r.store) store_keep(r.store, &patch);
+        code = patch_mesh(&r, &f, &bytes, &size, &error);
     request_free(&r);
     if (code != SQLITE_OK)
         scalar_error(result, "rqt_mesh", code, error);
-    else if (kind == FORMAT_OBJ && other)
+    else if (f.family == MESH_OTHER && f.kind == FORMAT_OBJ)
         sqlite3_result_text64(result, (const char *)bytes, size, sqlite3_free, SQLITE_UTF8);
     else
         sqlite3_result_blob64(result, bytes, size, sqlite3_free);

@@ -34,7 +34,7 @@ def main():
         (shutil.copytree if os.path.isdir(name) else shutil.copy2)(name, os.path.join(tree, name))
     # Objects are up to date with the sources they came from: times are kept.
     shutil.copytree(build, os.path.join(tree, "build"),
-                    ignore=shutil.ignore_patterns("mutants", "sanitized", "bench", "chart", "peers", "demo", "*.log"))
+                    ignore=shutil.ignore_patterns("mutants", "sanitized", "threads", "coverage", "fuzz", "lint", "bench", "chart", "peers", "demo", "*.log"))
     absolute = os.path.abspath(tree)
     environment = dict(os.environ, RQT_SEED="1", TMPDIR=absolute, RQT=absolute + "/build/rqt",
                        RQT_SO=absolute + "/build/rqt.so")

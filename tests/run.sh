@@ -1,9 +1,10 @@
 #!/bin/bash
-# run.sh [quick] - runs every test program and script, two at a time, and ends with `N passed, N failed`.
+# run.sh [quick|programs] - runs every test program and script, two at a time, and ends with `N passed, N failed`.
 #
 # A cmocka program says `[  PASSED  ] n` and `[  FAILED  ] n`, a script `N passed, N failed`; both are counted. One that
 # ends badly without naming a failed test, or runs none, counts as one failure. Output goes to build/tests/*.log; of what
-# failed the telling lines are shown. Without `quick`, the programs run a second time as built with ASan and UBSan.
+# failed the telling lines are shown. Without `quick`, the programs run a second time as built with ASan and UBSan. With `programs`, only those
+# that PROGRAMS lists, as they are built.
 set -u
 BUILD=${BUILD:-build}
 mode=${1:-full}
@@ -32,7 +33,10 @@ export -f run_one
 
 export RQT=$PWD/$BUILD/rqt RQT_SO=$PWD/$BUILD/rqt.so
 export ASAN_OPTIONS=detect_leaks=1:allocator_may_return_null=1
-{
+export TSAN_OPTIONS=suppressions=$PWD/tests/threads.supp
+if [ "$mode" = programs ]; then
+    for name in $PROGRAMS; do printf '%s\0' "$name|$BUILD/tests/$name"; done
+else
     # The longest first, so that none is left over at the end.
     for script in tests/test_*.sh; do printf '%s\0' "$(basename "$script")|bash|$script"; done
     if [ "$mode" = full ]; then
@@ -40,10 +44,14 @@ export ASAN_OPTIONS=detect_leaks=1:allocator_may_return_null=1
             name=$(basename "$source" .c)
             printf '%s\0' "$name sanitized|$BUILD/sanitized/tests/$name"
         done | awk 'BEGIN { RS = ORS = "\0" } !seen[$0]++'
+        for source in tests/fuzz/fuzz_*.c; do # once, where a sanitizer looks
+            name=$(basename "$source" .c)
+            printf '%s\0' "$name sanitized|$BUILD/sanitized/tests/fuzz/$name"
+        done
     fi
     for source in tests/test_*.c; do
         name=$(basename "$source" .c)
         printf '%s\0' "$name|$BUILD/tests/$name"
     done
-} | xargs -0 -P 2 -n 1 bash -c 'IFS="|" read -r -a command <<<"$0"; run_one "${command[@]}"'
+fi | xargs -0 -P 2 -n 1 bash -c 'IFS="|" read -r -a command <<<"$0"; run_one "${command[@]}"'
 awk '$2 > 0 { printf "FAILED %s\n", $3 } { passed += $1; failed += $2 } END { printf "%d passed, %d failed\n", passed, failed; exit failed > 0 }' "$logs"/*.sum

@@ -62,7 +62,7 @@ printf 'not a raster\n' >text.txt
 # -------------------------------------------------------------------------------------------------- help, usage
 prints "rqt --help" "Commands:" --help
 prints "rqt --version" "rqt 0." --version
-for c in import info check verify mesh chart; do
+for c in import update info check verify mesh chart; do
     prints "rqt --help lists $c" "  $c " --help
     prints "rqt $c --help has examples" "Examples:" $c --help
     n=$(sed -n '/^Examples:/,$p' out | grep -c "^  rqt $c")
@@ -76,7 +76,7 @@ done
 refuses "no command" 2 "a command is missing"
 refuses "unknown command" 2 "there is no command dance" dance
 refuses "unknown option before a command" 2 "there is no option --dance" --dance
-for c in update serve; do refuses "rqt $c is for later" 2 "not in this version" $c x; done
+for c in serve; do refuses "rqt $c is for later" 2 "not in this version" $c x; done
 
 # ------------------------------------------------------------------------------------------------------- import
 refuses "import: nothing" 2 "a source and a database are missing" import
@@ -127,6 +127,34 @@ else
     grep -q $'\r.*%' tty && grep -q 'Msamples/s' tty; ok "import on a terminal shows progress" $? "$(head -c 300 tty)"
     rm -f tty.gpkg
 fi
+
+# ------------------------------------------------------------------------------------------------------- update
+# 10 x 8 samples from column 20, row 10 of the hill on, and what was there.
+window() { # file, what to add
+    awk -v add="$2" 'NR > 6 + 10 && NR <= 6 + 18 { if (!n++) print "ncols 10\nnrows 8\nxllcorner 1200\nyllcorner 2320\ncellsize 10\nNODATA_value -9999"
+        for (c = 21; c <= 30; c++) printf "%d%s", $c + add, c == 30 ? "\n" : " " }' hill.asc >"$1"
+}
+window back.asc 0
+window patch.asc 25
+rqt import --name hill hill.asc updated.gpkg
+cp updated.gpkg original.gpkg
+refuses "update: nothing" 2 "a source and a database are missing" update
+refuses "update: no database" 2 "the database is missing" update patch.asc
+refuses "update: a bad nodata" 2 "--nodata none is not a number" update --nodata none patch.asc updated.gpkg
+refuses "update: a bad unit" 2 "--unit furlong: m, ft, us-ft" update --unit furlong patch.asc updated.gpkg
+refuses "update: --voids with a value" 2 "the option --voids takes no value" update --voids=1 patch.asc updated.gpkg
+refuses "update: a missing source" 1 "No such file" update nothing.tif updated.gpkg
+refuses "update: a missing database" 1 "No such file" update patch.asc nothing.gpkg
+refuses "update: an unknown terrain" 1 "there is no terrain dale; there is hill" update --terrain dale patch.asc updated.gpkg
+cmp -s updated.gpkg original.gpkg; ok "update: what is refused changes no byte of the file" $?
+prints "update says what was put in" "hill: 80 samples put in, 80 of them differ" update patch.asc updated.gpkg
+[ ! -s err ]; ok "update is silent in a pipe" $? "$(cat err)"
+prints "update: the database is sound" "hill: sound" check updated.gpkg
+blocks='SELECT id, hex(summary), hex(data) FROM rqt_block_1'
+[ "$(sqlite3 updated.gpkg "$blocks" | md5sum)" != "$(sqlite3 original.gpkg "$blocks" | md5sum)" ]; ok "update changes blocks" $?
+prints "update: the same again writes nothing" "nothing written" update patch.asc updated.gpkg
+rqt update back.asc updated.gpkg
+[ "$(sqlite3 updated.gpkg "$blocks" | md5sum)" = "$(sqlite3 original.gpkg "$blocks" | md5sum)" ]; ok "update back restores the blocks" $?
 
 # ----------------------------------------------------------------------------------------------------- info, check
 for c in info check verify mesh; do refuses "$c: no database" 2 "a database is missing" $c; done
@@ -209,6 +237,7 @@ refuses "mesh: no ending" 2 "the file ends in" $M --eps 1 -o .obj
 refuses "mesh: an unknown outline" 2 "there is no such outline; there are exact and tol" $M --eps 1 --outline x -o a.obj
 refuses "mesh: an unknown mode" 2 "there is no such mode" $M --eps 1 --mode x -o a.obj
 refuses "mesh: a list of eps for a model" 2 "--eps takes one number" $M --eps 1,2 -o a.obj
+refuses "mesh: normals in a file that holds none" 2 "a.obj holds no normals; a .ply does" $M --eps 1 --normals -o a.obj
 refuses "mesh: too narrow" 2 "--width 100" $M --eps 1 --width 100 -o a.png
 refuses "mesh: the database itself" 2 "is the database itself" $M --eps 1 -o ./t.gpkg
 ln -s t.gpkg link.gpkg
@@ -252,6 +281,22 @@ ok "gpkg of nothing is an empty layer" $? "$(cat err)"
 rqt $M --eps 2 --mode cover -o x.obj; cp x.obj first.obj; echo old >x.obj
 rqt $M --eps 2 -o x.obj; cmp -s x.obj first.obj; ok "mesh replaces a file, and gives the same bytes again" $?
 rqt $M --eps 2 -o X.OBJ; [ $status = 0 ] && cmp -s X.OBJ first.obj; ok "mesh: endings in capitals" $?
+triangle='POLYGON((1203.5 2204,1390 2211.5,1290.25 2399,1203.5 2204))'
+want=$(sql t.gpkg "SELECT count(*) FROM rqt_triangles('$triangle', 2, 'hill', '{\"mode\":\"cut\",\"outline\":\"tol\"}')")
+for kind in obj ply gpkg svg png; do
+    rqt $M --eps 2 --region "$triangle" --mode cut --outline tol -o cut.$kind
+    case $kind in
+        obj) got=$(grep -c '^f ' cut.obj) ;;
+        ply) got=$(sed -n 's/^element face //p' <(head -c 600 cut.ply | tr -d '\0')) ;;
+        gpkg) got=$(sqlite3 cut.gpkg 'SELECT count(*) FROM hill') ;;
+        *) got=$want ;;
+    esac
+    [ $status = 0 ] && [ -s cut.$kind ] && [ "$got" = "$want" ] && [ "$want" -gt 20 ]
+    ok "mesh: mode cut as .$kind" $? "$got, not $want; $(cat err)"
+done
+rqt $M --eps 2 --normals -o n.ply
+sqlite3 t.gpkg -cmd ".load $RQT_SO" "SELECT writefile('sql.ply', rqt_mesh(NULL, 2, 'ply+normals', 'hill'))" >/dev/null 2>&1
+[ -s n.ply ] && cmp -s n.ply sql.ply && grep -aq 'property float nz' n.ply; ok "mesh --normals: SQL's bytes, with normals" $? "$(cat err)"
 if command -v gdal_translate >/dev/null; then
     gdal_translate -q -a_srs EPSG:32633 hill.asc utm.tif 2>/dev/null
     rqt import utm.tif utm.gpkg
@@ -299,7 +344,7 @@ for region in 'POINT(1300 2300)' 'LINESTRING(1100 2100,1500 2400)' \
 done
 rqt mesh t.gpkg --terrain my.hole-2 --eps 2,9 -o v.png; [ $status = 0 ]; ok "png with voids" $? "$(cat err)"
 if [ -w /dev/full ]; then
-    "$RQT" info t.gpkg >/dev/full 2>err; [ $? = 1 ] && grep -q 'stdout' err; ok "a full disk under stdout is a failure" $? "$(cat err)"
+    "$RQT" info t.gpkg >/dev/full 2>err; [ $? = 1 ] && grep -q 'stdout' err; ok "F50 a full disk under stdout is a failure" $? "$(cat err)"
 fi
 [ -z "$(ls -A | grep '\.part-')" ]; ok "no temporary file is left" $?
 
@@ -406,7 +451,7 @@ db.execute("BEGIN IMMEDIATE"); open("locked", "w").close(); time.sleep(8)
 PY
 locker=$!
 until [ -e locked ]; do sleep 0.05; done
-refuses "import: a locked database" 1 "locked" import --replace hill.asc t.gpkg
+refuses "F50 import: a locked database" 1 "locked" import --replace hill.asc t.gpkg
 prints "info while another program writes" "hill" info t.gpkg
 kill $locker; wait $locker 2>/dev/null
 
@@ -447,10 +492,10 @@ for moment in 10 40 70 writing; do
                 { [ $status = 0 ] || [ $kind = old ] || [ ! -e k.gpkg ]; } ;;
             KILL) [ $status = 0 ] || [ $status = 137 ] ;;
             esac
-            ok "SIG$signal at $moment, $kind database: status and sentence" $? "$status $(cat stop.err)"
+            ok "F49 SIG$signal at $moment, $kind database: status and sentence" $? "$status $(cat stop.err)"
             rqt info k.gpkg
             ! grep -q '^big' out || [[ $before == *big* ]]; ok "... info shows no half terrain" $? "$(cat out)"
-            is_as_before k.gpkg "$before"; ok "... what was there is there, and sound" $? "expected '$before'; $(ls -l k.gpkg* 2>&1; cat check.out 2>/dev/null)"
+            is_as_before k.gpkg "$before"; ok "F49 ... what was there is there, and sound" $? "expected '$before'; $(ls -l k.gpkg* 2>&1; cat check.out 2>/dev/null)"
         done
     done
 done
@@ -466,7 +511,7 @@ prints "info of a database whose writer was killed rolls back" "my.hole-2" info 
 [ ! -e hot.gpkg-journal ]; ok "... and leaves no journal" $? "$(ls -l hot*)"
 rm -f f.gpkg*; (ulimit -f 2000; "$RQT" import --memory 4000 big.bil f.gpkg >out 2>err)
 [ $? = 1 ] && grep -q 'f.gpkg' err && [ -z "$(ls | grep '^f.gpkg')" ]
-ok "import beyond the limit of file sizes: a sentence, and nothing left" $? "$(cat out err; ls -l f.gpkg* 2>&1)"
+ok "F50 import beyond the limit of file sizes: a sentence, and nothing left" $? "$(cat out err; ls -l f.gpkg* 2>&1)"
 rqt import --name big --replace big.bil k.gpkg; [ $status = 0 ]; ok "importing again works after all that" $? "$(cat err)"
 rqt check k.gpkg; [ $status = 0 ] && grep -q '^big: sound' out; ok "... and is sound" $? "$(cat out err)"
 "$RQT" mesh k.gpkg --terrain big --eps 0 -o stopped.gpkg 2>/dev/null & pid=$!

@@ -382,7 +382,7 @@ static void assert_corrupt(rqt_codec *codec, const uint8_t *data, size_t size, r
     }
 }
 
-static void every_truncation_of_a_block_is_noticed(void **state) {
+static void F42_every_truncation_of_a_block_is_noticed(void **state) {
     (void)state;
     random_begin(__func__);
     rqt_codec *codec = new_codec();
@@ -407,7 +407,7 @@ static void every_truncation_of_a_block_is_noticed(void **state) {
     rqt_codec_free(codec);
 }
 
-static void every_flipped_bit_of_a_block_is_noticed(void **state) {
+static void F42_every_flipped_bit_of_a_block_is_noticed(void **state) {
     (void)state;
     random_begin(__func__);
     rqt_codec *codec = new_codec();
@@ -447,7 +447,7 @@ static bytes forge(const uint8_t *header, const uint8_t *payload, size_t n) {
     return b;
 }
 
-static void a_header_that_lies_is_found_out_under_a_good_checksum(void **state) {
+static void F42_a_header_that_lies_is_found_out_under_a_good_checksum(void **state) {
     (void)state;
     random_begin(__func__);
     rqt_codec *codec = new_codec();
@@ -528,7 +528,7 @@ static void a_header_that_lies_is_found_out_under_a_good_checksum(void **state) 
     rqt_codec_free(codec);
 }
 
-static void a_payload_that_lies_is_found_out_under_a_good_checksum(void **state) {
+static void F42_a_payload_that_lies_is_found_out_under_a_good_checksum(void **state) {
     (void)state;
     random_begin(__func__);
     rqt_codec *codec = new_codec();
@@ -674,7 +674,34 @@ static void a_payload_that_lies_is_found_out_under_a_good_checksum(void **state)
     rqt_codec_free(codec);
 }
 
-static void random_payloads_under_a_good_checksum_do_no_harm(void **state) {
+/* Each byte of the compressed frame, damaged and signed again. */
+static void F42_a_frame_that_does_not_decompress_is_noticed(void **state) {
+    (void)state;
+    random_begin(__func__);
+    rqt_codec *codec = new_codec();
+    rqt_block block = new_block(3), scratch = new_block(3);
+    fill(&block, 9, 9, NOISE, 0, LIKELY_ERRORS, 0);
+    bytes b = encode(codec, &block, 1);
+    int noticed = 0, broken = 0;
+    for (size_t at = HEADER_BYTES; at < b.size; at++) {
+        rqt_message why = {""};
+        b.data[at] ^= 0x5A;
+        sign(b);
+        if (rqt_block_check(codec, b.data, b.size, &why) != RQT_OK) {
+            assert_int_equal(rqt_block_decode(codec, b.data, b.size, &scratch), RQT_CORRUPT);
+            noticed++;
+            broken += strstr(why.text, "does not decompress") != NULL;
+        }
+        b.data[at] ^= 0x5A;
+    }
+    assert_true(noticed > 5 && broken > 0);
+    free(b.data);
+    rqt_block_free(&block, &allocator);
+    rqt_block_free(&scratch, &allocator);
+    rqt_codec_free(codec);
+}
+
+static void F42_random_payloads_under_a_good_checksum_do_no_harm(void **state) {
     (void)state;
     random_begin(__func__);
     rqt_codec *codec = new_codec();
@@ -754,7 +781,7 @@ static rqt_status use_memory(void) {
     return status;
 }
 
-static void a_refused_allocation_is_no_memory_and_no_leak(void **state) {
+static void F48_a_refused_allocation_is_no_memory_and_no_leak(void **state) {
     (void)state;
     random_begin(__func__);
     the_heap.calls = 0;
@@ -798,12 +825,13 @@ int main(void) {
         cmocka_unit_test(equal_blocks_give_equal_bytes_whatever_lies_under_their_voids),
         cmocka_unit_test(errors_that_their_heights_imply_take_no_plane),
         cmocka_unit_test(what_cannot_be_stored_is_refused),
-        cmocka_unit_test(every_truncation_of_a_block_is_noticed),
-        cmocka_unit_test(every_flipped_bit_of_a_block_is_noticed),
-        cmocka_unit_test(a_header_that_lies_is_found_out_under_a_good_checksum),
-        cmocka_unit_test(a_payload_that_lies_is_found_out_under_a_good_checksum),
-        cmocka_unit_test(random_payloads_under_a_good_checksum_do_no_harm),
-        cmocka_unit_test(a_refused_allocation_is_no_memory_and_no_leak),
+        cmocka_unit_test(F42_every_truncation_of_a_block_is_noticed),
+        cmocka_unit_test(F42_every_flipped_bit_of_a_block_is_noticed),
+        cmocka_unit_test(F42_a_header_that_lies_is_found_out_under_a_good_checksum),
+        cmocka_unit_test(F42_a_payload_that_lies_is_found_out_under_a_good_checksum),
+        cmocka_unit_test(F42_a_frame_that_does_not_decompress_is_noticed),
+        cmocka_unit_test(F42_random_payloads_under_a_good_checksum_do_no_harm),
+        cmocka_unit_test(F48_a_refused_allocation_is_no_memory_and_no_leak),
         cmocka_unit_test(a_block_takes_the_memory_that_it_says),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -211,10 +211,43 @@ static void a_scratch_file_that_refuses_stops_the_build(void **state) {
     model_free(&m);
 }
 
+static void a_build_takes_what_it_announced_or_refuses(void **state) {
+    (void)state;
+    rqt_lattice l;
+    rqt_build *build = (rqt_build *)&l; /* anything */
+    const rqt_scratch_file file = {0};
+    assert_int_equal(rqt_lattice_init(&l, 100, 70), RQT_OK);
+    const struct {
+        int k, b;
+        const rqt_scratch_file *file;
+    } refused[] = {{3, 2, &file}, {3, 8, &file}, {-1, 3, &file}, {9, 9, &file}, {0, 3, &file}, {3, 4, NULL}};
+    for (size_t i = 0; i < sizeof refused / sizeof *refused; i++) {
+        assert_int_equal(rqt_build_create(&l, refused[i].k, refused[i].b, refused[i].file, &test_allocator, &build),
+                         RQT_INVALID);
+        assert_null(build);
+    }
+    memset(&test_heap, 0, sizeof test_heap);
+    assert_int_equal(rqt_build_create(&l, 3, 4, &file, &test_allocator, &build), RQT_OK);
+    CHECK(test_heap.live <= rqt_build_bytes(&l, 3, 4), "%zu bytes, %zu announced", test_heap.live,
+          rqt_build_bytes(&l, 3, 4));
+    rqt_build_free(build);
+    assert_int_equal(test_heap.live, 0);
+    const size_t calls = test_heap.calls;
+    for (size_t n = 1; n <= calls; n++) {
+        memset(&test_heap, 0, sizeof test_heap);
+        test_heap.fail_from = test_heap.fail_to = n;
+        assert_int_equal(rqt_build_create(&l, 3, 4, &file, &test_allocator, &build), RQT_NO_MEMORY);
+        assert_null(build);
+        assert_int_equal(test_heap.live, 0);
+    }
+    memset(&test_heap, 0, sizeof test_heap);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         TEST(blocks_of_bands_are_those_of_the_pyramid),
         TEST(a_scratch_file_that_refuses_stops_the_build),
+        TEST(a_build_takes_what_it_announced_or_refuses),
     };
     return cmocka_run_group_tests_name("build", tests, NULL, NULL);
 }

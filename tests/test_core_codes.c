@@ -73,7 +73,7 @@ static void codes_mean_what_the_format_says(void **state) {
     mpq_clears(value, core, NULL);
 }
 
-static void errors_in_quanta_round_up_only_at_random(void **state) {
+static void F45_errors_in_quanta_round_up_only_at_random(void **state) {
     (void)state;
     random_begin("quanta at random");
     for (int n = 0; n < 20000; n++) {
@@ -90,7 +90,7 @@ static void errors_in_quanta_round_up_only_at_random(void **state) {
     }
 }
 
-static void errors_in_quanta_round_up_only_next_to_every_code(void **state) {
+static void F45_errors_in_quanta_round_up_only_next_to_every_code(void **state) {
     (void)state;
     random_begin("quanta next to codes");
     mpq_t boundary, quantum, part;
@@ -171,7 +171,7 @@ static void scales_at_the_ends_of_double_neither_overflow_nor_vanish(void **stat
     }
 }
 
-static void outline_costs_round_up_only(void **state) {
+static void F45_outline_costs_round_up_only(void **state) {
     (void)state;
     random_begin("ground");
     const double special[] = {1.0, 0.1,       25.0, 1.0 / 3, DBL_MAX, DBL_MIN, 0x1p-1074, 30.922080775909325,
@@ -332,11 +332,11 @@ int main(void) {
     random_announce();
     const struct CMUnitTest tests[] = {
         TEST(codes_mean_what_the_format_says),
-        TEST(errors_in_quanta_round_up_only_at_random),
-        TEST(errors_in_quanta_round_up_only_next_to_every_code),
+        TEST(F45_errors_in_quanta_round_up_only_at_random),
+        TEST(F45_errors_in_quanta_round_up_only_next_to_every_code),
         TEST(exact_powers_of_feet_and_odd_scales_are_not_rounded_further),
         TEST(scales_at_the_ends_of_double_neither_overflow_nor_vanish),
-        TEST(outline_costs_round_up_only),
+        TEST(F45_outline_costs_round_up_only),
         TEST(every_tolerance_of_eight_significant_bits_is_a_code),
         TEST(floor_is_the_largest_code_not_above),
         TEST(eps_gives_up_the_quantum_error_and_rounds_down),

@@ -408,6 +408,80 @@ static void F26_polygons_of_all_kinds_are_cut_to_their_area(void **state) {
     }
 }
 
+/* The faces tile the leaf, have areas, and neighbours know each other. */
+static void check_faces(const cut_faces *f) {
+    const region_point *corner = f->points;
+    __int128 sum = 0;
+    for (size_t t = 0; t < f->face_count; t++) {
+        const cut_face *face = &f->faces[t];
+        const __int128 twice =
+            region_side(f->points[face->corner[0]], f->points[face->corner[1]], f->points[face->corner[2]]);
+        CHECK(twice > 0, "face %zu has no area", t);
+        sum += twice;
+        for (int i = 0; i < 3; i++) {
+            const uint32_t from = face->corner[i], to = face->corner[(i + 1) % 3];
+            if (face->next[i] != CUT_NO_FACE) { /* both say so of the same edge */
+                const cut_face *o = &f->faces[face->next[i]];
+                bool back = false;
+                for (int k = 0; k < 3; k++)
+                    back |= o->next[k] == t && o->corner[k] == to && o->corner[(k + 1) % 3] == from &&
+                            o->fixed[k] == face->fixed[i];
+                CHECK(back, "faces %zu and %u are neighbours one way", t, face->next[i]);
+                continue;
+            }
+            bool on_side = false; /* nothing beyond: it lies on a side of the leaf */
+            for (int k = 0; k < 3; k++)
+                on_side |= region_side(corner[k], corner[(k + 1) % 3], f->points[from]) == 0 &&
+                           region_side(corner[k], corner[(k + 1) % 3], f->points[to]) == 0;
+            CHECK(on_side, "face %zu has no neighbour inside the leaf", t);
+        }
+    }
+    CHECK(sum == region_side(corner[0], corner[1], corner[2]), "the faces do not tile the leaf");
+}
+
+/* Points nearer to a border than its grid is fine: on which side of y = 0.3 x? */
+static void the_region_holds_points_finer_than_its_grid(void **state) {
+    (void)state;
+    random_begin(__func__);
+    rqt_lattice lattice;
+    assert_int_equal(rqt_lattice_init(&lattice, 17, 17), RQT_OK);
+    rqt_region *region = region_of_shape("POLYGON((0 0, 10 3, 0 3, 0 0))", &lattice);
+    int inside = 0;
+    for (int n = 0; n < 2000; n++) {
+        const int bits = random_between(1, 34);
+        const int64_t unit = (int64_t)1 << bits,
+                      x = 1 + (int64_t)(random_bits() % (uint64_t)(9 * ORACLE_UNITS * unit)),
+                      y = 3 * (x / 10) + random_between(-3, 5);
+        if (10 * y == 3 * x || y <= 0) continue; /* on it: either */
+        const region_fine_point p = {{x >> bits, y >> bits}, x & (unit - 1), y & (unit - 1), bits};
+        CHECK(region_holds(region, &p) == (10 * y > 3 * x), "(%lld, %lld) / 2^%d", (long long)x, (long long)y,
+              bits);
+        inside += 10 * y > 3 * x;
+    }
+    assert_true(inside > 200 && inside < 1800);
+    rqt_region_free(region);
+}
+
+/* A segment that passes below the end of an edge which hangs between two of the faces it takes out: x-y here. */
+static void a_segment_passes_below_a_hanging_edge(void **state) {
+    (void)state;
+    const region_point corner[3] = {{-1000, -1000}, {1000, -1000}, {0, 3000}};
+    const region_point at[6] = {{0, 20}, {0, 10}, {-10, 0}, {10, 0}, {-400, 5}, {400, 5}};
+    cut_faces f = {.allocator = test_allocator};
+    uint32_t point[6];
+    assert_true(cut_faces_begin(&f, corner));
+    for (int i = 0; i < 6; i++) assert_true(cut_faces_add(&f, at[i], &point[i]));
+    assert_true(cut_faces_fix(&f, point[0], point[1]));
+    check_faces(&f);
+    assert_true(cut_faces_fix(&f, point[4], point[5]));
+    check_faces(&f);
+    int fixed = 0;
+    for (size_t t = 0; t < f.face_count; t++)
+        for (int i = 0; i < 3; i++) fixed += f.faces[t].fixed[i];
+    assert_int_equal(fixed, 4); /* both edges, from both sides */
+    cut_faces_free(&f);
+}
+
 /* Rounding at its worst: leaves of a few units, so that every crossing moves far, and hundreds of segments.
  * Whatever becomes of the segments, the faces tile the leaf. */
 static void faces_tile_the_leaf_whatever_rounding_does(void **state) {
@@ -438,34 +512,13 @@ static void faces_tile_the_leaf_whatever_rounding_does(void **state) {
                 assert_true(cut_faces_add(&f, p, &end[e]));
                 CHECK(f.points[end[e]].x == p.x && f.points[end[e]].y == p.y, "point %u is elsewhere", end[e]);
             }
+            const size_t before = f.point_count;
             assert_true(cut_faces_fix(&f, end[0], end[1]));
-        }
-        __int128 sum = 0;
-        for (size_t t = 0; t < f.face_count; t++) {
-            const cut_face *face = &f.faces[t];
-            const __int128 twice =
-                region_side(f.points[face->corner[0]], f.points[face->corner[1]], f.points[face->corner[2]]);
-            CHECK(twice > 0, "face %zu has no area", t);
-            sum += twice;
-            for (int i = 0; i < 3; i++) {
-                const uint32_t from = face->corner[i], to = face->corner[(i + 1) % 3];
-                if (face->next[i] != CUT_NO_FACE) { /* both say so of the same edge */
-                    const cut_face *o = &f.faces[face->next[i]];
-                    bool back = false;
-                    for (int k = 0; k < 3; k++)
-                        back |= o->next[k] == t && o->corner[k] == to && o->corner[(k + 1) % 3] == from &&
-                                o->fixed[k] == face->fixed[i];
-                    CHECK(back, "faces %zu and %u are neighbours one way", t, face->next[i]);
-                    continue;
-                }
-                bool on_side = false; /* nothing beyond: it lies on a side of the leaf */
+            for (size_t i = before; i < f.point_count; i++) /* the sides are the neighbours' too */
                 for (int k = 0; k < 3; k++)
-                    on_side |= region_side(corner[k], corner[(k + 1) % 3], f.points[from]) == 0 &&
-                               region_side(corner[k], corner[(k + 1) % 3], f.points[to]) == 0;
-                CHECK(on_side, "face %zu has no neighbour inside the leaf", t);
-            }
+                    CHECK(region_side(corner[k], corner[(k + 1) % 3], f.points[i]) > 0, "a crossing is on a side");
         }
-        CHECK(sum == region_side(corner[0], corner[1], corner[2]), "the faces do not tile the leaf");
+        check_faces(&f);
         cut_faces_free(&f);
     }
 }
@@ -549,6 +602,66 @@ static void neighbours_share_the_vertices_of_their_border(void **state) {
     }
 }
 
+/* The largest lattice, whose root's diagonal is oblique where the raster ends; and regions whose corners are as far
+ * away as corners may be. */
+static void the_largest_terrains_and_regions(void **state) {
+    (void)state;
+    random_begin(__func__);
+    int meeting = 0;
+    for (int n = 0; n < 60; n++) {
+        const bool far = n % 2;
+        const int32_t w = far ? 17 : (1 << 20) + 1 - random_between(0, 1000),
+                      h = far ? 11 : random_between(300000, 1 << 20);
+        rqt_lattice lattice;
+        assert_int_equal(rqt_lattice_init(&lattice, w, h), RQT_OK);
+        rqt_patch_vertex v[4];
+        for (int i = 0; i < 4; i++)
+            v[i] = (rqt_patch_vertex){
+                .col = i & 1 ? w - 1 : 0, .row = i & 2 ? h - 1 : 0, .q = random_between(-1000000, 1000000)};
+        static const uint32_t root[6] = {0, 3, 1, 0, 2, 3};
+        uint32_t triangle[6];
+        static shape s;
+        memset(&s, 0, sizeof s);
+        s.members = s.rings[0] = 1;
+        s.spots[0][0] = random_between(3, 12);
+        for (int i = 0; i < s.spots[0][0]; i++) {
+            const int64_t reach = far ? (int64_t)1 << 59 : (int64_t)h * ORACLE_UNITS;
+            s.x[0][0][i] = (int64_t)(random_bits() % (uint64_t)(2 * reach)) - (far ? reach : reach / 2);
+            s.y[0][0][i] = (int64_t)(random_bits() % (uint64_t)(2 * reach)) - (far ? reach : reach / 2);
+            if (far) { /* what the text says is what doubles hold */
+                s.x[0][0][i] &= ~INT64_C(0xFFFF);
+                s.y[0][0][i] &= ~INT64_C(0xFFFF);
+            }
+        }
+        shape_say(&s);
+        rqt_region *region = region_of_shape(s.text, &lattice);
+        rqt_patch patch = {.vertices = v, .vertex_count = 4, .triangles = triangle};
+        for (int t = 0; t < 2; t++) { /* as a query would */
+            rqt_vertex at[3];
+            uint32_t *to = triangle + 3 * patch.triangle_count;
+            for (int k = 0; k < 3; k++) at[k] = (rqt_vertex){v[root[3 * t + k]].col, v[root[3 * t + k]].row};
+            if (!rqt_region_meets(region, at[0], at[1], at[2])) continue;
+            memcpy(to, root + 3 * (size_t)t, 3 * sizeof *to);
+            patch.triangle_count++;
+        }
+        meeting += patch.triangle_count > 0;
+        rqt_cut cut;
+        assert_int_equal(rqt_cut_make(&patch, region, &lattice, &test_allocator, NULL, NULL, &cut), RQT_OK);
+        long double wanted = 0;
+        for (int t = 0; t < 2; t++) {
+            oracle_point leaf[3];
+            for (int k = 0; k < 3; k++) leaf[k] = (oracle_point){v[root[3 * t + k]].col, v[root[3 * t + k]].row};
+            wanted += common_area(leaf, &s);
+        }
+        const long double area = check_mesh(&cut, lattice.K, "large");
+        CHECK(fabsl(area - wanted) <= (far ? 1e-5L : 1e-9L * w * h), "%s: area %.18Lg, should be %.18Lg", s.text,
+              area, wanted);
+        rqt_cut_free(&cut);
+        rqt_region_free(region);
+    }
+    CHECK(meeting > 20, "%d regions met the terrain", meeting);
+}
+
 static int looks;
 static bool stops(void *context) {
     return ++looks >= *(const int *)context;
@@ -608,8 +721,11 @@ int main(void) {
     random_announce();
     const struct CMUnitTest tests[] = {
         TEST(shares_are_the_nearest),
+        TEST(the_region_holds_points_finer_than_its_grid),
+        TEST(a_segment_passes_below_a_hanging_edge),
         TEST(faces_tile_the_leaf_whatever_rounding_does),
         TEST(neighbours_share_the_vertices_of_their_border),
+        TEST(the_largest_terrains_and_regions),
         TEST(F48_no_memory_and_interrupt_leave_nothing),
         TEST(F26_polygons_of_all_kinds_are_cut_to_their_area),
     };

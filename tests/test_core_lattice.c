@@ -80,7 +80,7 @@ static void parents_children_and_levels_equal_the_oracles_graph(void **state) {
 }
 
 /* No oracle is that large; parents and children must agree with each other up to the largest lattice. */
-static void the_largest_lattice_is_consistent(void **state) {
+static void F47_the_largest_lattice_is_consistent(void **state) {
     (void)state;
     random_begin("largest lattice");
     rqt_lattice l;
@@ -228,7 +228,7 @@ static void errors_of_rasters_beyond_the_oracles_lattice_are_exact_where_we_look
     check_large_raster(r, 40, 5);
 }
 
-static void a_plane_has_no_error_anywhere(void **state) {
+static void F2_planes_of_odd_slopes_have_no_error_anywhere(void **state) {
     (void)state;
     random_begin("plane");
     for (int n = 0; n < 60; n++) {
@@ -453,14 +453,14 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         TEST(the_root_square_is_the_smallest_that_holds_the_raster),
         TEST(parents_children_and_levels_equal_the_oracles_graph),
-        TEST(the_largest_lattice_is_consistent),
+        TEST(F47_the_largest_lattice_is_consistent),
         TEST(errors_equal_the_oracles_for_every_small_extent),
         TEST(errors_equal_the_oracles_on_adversarial_surfaces),
         TEST(errors_equal_the_oracles_in_feet_and_in_thousandths),
         TEST(errors_past_the_last_sample_are_exact),
         TEST(errors_of_long_and_narrow_rasters_are_exact),
         TEST(errors_of_rasters_beyond_the_oracles_lattice_are_exact_where_we_look),
-        TEST(a_plane_has_no_error_anywhere),
+        TEST(F2_planes_of_odd_slopes_have_no_error_anywhere),
         TEST(values_at_voids_do_not_matter),
         TEST(errors_can_be_stopped_and_leave_nothing),
         TEST(algorithms_1_and_2_and_a_threshold_select_the_same),

@@ -141,12 +141,12 @@ static void check_failures(bool from_then_on) {
     raster_free(&r);
 }
 
-static void one_refused_allocation_is_reported_and_nothing_leaks(void **state) {
+static void F48_one_refused_allocation_is_reported_and_nothing_leaks(void **state) {
     (void)state;
     check_failures(false);
 }
 
-static void refused_from_then_on_is_reported_and_nothing_leaks(void **state) {
+static void F48_refused_from_then_on_is_reported_and_nothing_leaks(void **state) {
     (void)state;
     check_failures(true);
 }
@@ -172,8 +172,8 @@ static void errors_take_the_memory_that_was_announced(void **state) {
 int main(void) {
     random_announce();
     const struct CMUnitTest tests[] = {
-        TEST(one_refused_allocation_is_reported_and_nothing_leaks),
-        TEST(refused_from_then_on_is_reported_and_nothing_leaks),
+        TEST(F48_one_refused_allocation_is_reported_and_nothing_leaks),
+        TEST(F48_refused_from_then_on_is_reported_and_nothing_leaks),
         TEST(errors_take_the_memory_that_was_announced),
     };
     return cmocka_run_group_tests_name("memory", tests, NULL, NULL);

@@ -244,32 +244,6 @@ static void queries_equal_the_global_walk_on_larger_rasters(void **state) {
     check_queries(r, 3, 1);
 }
 
-static void a_plane_at_eps_0_is_two_triangles(void **state) {
-    (void)state;
-    random_begin("two triangles");
-    for (int n = 0; n < 40; n++) {
-        model m;
-        database d;
-        rqt_patch patch;
-        model_create(&m, raster_make(SURFACE_PLANE, random_between(2, 40), random_between(2, 40), -1));
-        assert_int_equal(
-            database_create(&d, &m, random_between(smallest_k(&m.grid.lattice), m.grid.lattice.K), &test_allocator),
-            RQT_OK);
-        window all = window_all();
-        rqt_region *region = region_of(&all, &m.grid.lattice);
-        assert_int_equal(
-            database_query(&d, region, 0, RQT_SELECT_THRESHOLD, RQT_OUTLINE_EXACT, &test_allocator, &patch),
-            RQT_OK);
-        CHECK(patch.triangle_count == 2 && patch.vertex_count == 4, "%dx%d: %zu triangles", m.r.width, m.r.height,
-              patch.triangle_count);
-        assert_int_equal(d.reads, 0);
-        rqt_patch_free(&patch);
-        rqt_region_free(region);
-        database_free(&d, &test_allocator);
-        model_free(&m);
-    }
-}
-
 /* Unit half-cells against the mask: those with three valid corners are in the patch, all of each, once; of the
  * others nothing is. Triangles at the end of a raster cut half-cells anywhere, so areas are compared, not points.
  */
@@ -548,7 +522,6 @@ int main(void) {
         TEST(every_place_has_exactly_one_answering_block),
         TEST(queries_equal_the_global_walk_on_small_rasters),
         TEST(queries_equal_the_global_walk_on_larger_rasters),
-        TEST(a_plane_at_eps_0_is_two_triangles),
         TEST(no_valid_sample_is_further_than_eps_and_exact_outlines_are_exact),
         TEST(parts_of_a_split_window_make_exactly_the_whole),
         TEST(windows_are_rounded_to_units_wherever_the_terrain_lies),

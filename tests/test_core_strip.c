@@ -33,7 +33,7 @@ static void check_strip(const rqt_patch *p, size_t *length) {
     *length = n;
 }
 
-static void an_empty_patch_is_an_empty_strip(void **state) {
+static void F39_an_empty_patch_is_an_empty_strip(void **state) {
     (void)state;
     rqt_patch p = {.allocator = test_allocator};
     size_t n;
@@ -69,14 +69,15 @@ static void bare_triangles_in_any_order_make_a_strip(void **state) {
     }
 }
 
-static void strips_of_patches_are_the_patches(void **state) {
+static void F39_strips_of_patches_are_the_patches(void **state) {
     (void)state;
     random_begin("strips");
     for (int round = 0; round < 120; round++) {
         model m;
         database d;
-        raster r = raster_make((surface)random_between(0, SURFACE_COUNT - 1), random_between(2, 34),
-                               random_between(2, 34), random_between(-1, 8));
+        const int most = round < 8 ? 2 : 34; /* one root's two triangles, whole and with a void corner */
+        raster r = raster_make((surface)random_between(0, SURFACE_COUNT - 1), random_between(2, most),
+                               random_between(2, most), round < 4 ? -1 : random_between(-1, 8));
         if (round % 3 == 0) raster_add_lake(&r);
         model_create(&m, r);
         assert_int_equal(
@@ -254,9 +255,9 @@ static void a_full_mesh_costs_less_than_one_and_three_quarter_indices_a_triangle
 int main(void) {
     random_announce();
     const struct CMUnitTest tests[] = {
-        TEST(an_empty_patch_is_an_empty_strip),
+        TEST(F39_an_empty_patch_is_an_empty_strip),
         TEST(bare_triangles_in_any_order_make_a_strip),
-        TEST(strips_of_patches_are_the_patches),
+        TEST(F39_strips_of_patches_are_the_patches),
         TEST(every_product_is_the_same_patch),
         TEST(blocks_that_only_touch_the_region_are_not_read),
         TEST(a_full_mesh_costs_less_than_one_and_three_quarter_indices_a_triangle),

@@ -304,6 +304,84 @@ static void test_spatialite_reads_it(void **state) {
     assert_int_equal(sqlite3_close(db), SQLITE_OK);
 }
 
+/* Where the text ends that is in the bytes once. */
+static size_t end_of(const uint8_t *bytes, size_t size, const char *text) {
+    const size_t n = strlen(text);
+    for (size_t at = 0; at + n <= size; at++)
+        if (memcmp(bytes + at, text, n) == 0) return at + n;
+    fail_msg("no %s", text);
+    return 0;
+}
+
+/* The same file, and 12 bytes more a vertex, whatever the count; other formats pass normals over. */
+static void test_ply_normals(void **state) {
+    (void)state;
+    static const int counts[] = {0, 1, 2, 17, 300};
+    static const char added[] = "property float nx\nproperty float ny\nproperty float nz\n";
+    for (size_t c = 0; c < sizeof counts / sizeof *counts; c++) {
+        sample_patch s;
+        patch_begin(&s, counts[c], 2056);
+        const size_t n = s.patch.vertex_count;
+        float *normals = calloc(3 * n + 1, sizeof *normals);
+        assert_non_null(normals);
+        for (size_t i = 0; i < 3 * n; i++) normals[i] = (float)random_between(-1000, 1000) / 1000;
+        uint8_t *bytes[FORMAT_SPATIALITE + 1][2];
+        size_t size[FORMAT_SPATIALITE + 1][2];
+        for (format_kind kind = FORMAT_OBJ; kind <= FORMAT_SPATIALITE; kind++)
+            for (int with = 0; with < 2; with++) {
+                s.frame.normals = with ? normals : NULL;
+                assert_int_equal(
+                    format_patch(&s.patch, &s.frame, kind, &s.allocator, &bytes[kind][with], &size[kind][with]),
+                    RQT_OK);
+            }
+        for (format_kind kind = FORMAT_OBJ; kind <= FORMAT_SPATIALITE; kind++) {
+            if (kind == FORMAT_PLY) continue;
+            assert_int_equal(size[kind][0], size[kind][1]);
+            assert_memory_equal(bytes[kind][0], bytes[kind][1], size[kind][0]);
+        }
+        const uint8_t *plain = bytes[FORMAT_PLY][0], *with = bytes[FORMAT_PLY][1];
+        const size_t added_bytes = sizeof added - 1;
+        assert_int_equal(size[FORMAT_PLY][1], size[FORMAT_PLY][0] + added_bytes + 12 * n);
+        const size_t before = end_of(plain, size[FORMAT_PLY][0], "property double z\n");
+        assert_memory_equal(with, plain, before);
+        assert_memory_equal(with + before, added, added_bytes);
+        const size_t head = end_of(plain, size[FORMAT_PLY][0], "end_header\n");
+        assert_memory_equal(with + before + added_bytes, plain + before, head - before);
+        for (size_t i = 0; i < n; i++) {
+            const uint8_t *vertex = with + head + added_bytes + 36 * i;
+            assert_memory_equal(vertex, plain + head + 24 * i, 24);
+            assert_memory_equal(vertex + 24, normals + 3 * i, 12);
+        }
+        assert_memory_equal(with + head + added_bytes + 36 * n, plain + head + 24 * n,
+                            size[FORMAT_PLY][0] - head - 24 * n);
+        for (format_kind kind = FORMAT_OBJ; kind <= FORMAT_SPATIALITE; kind++)
+            for (int k = 0; k < 2; k++) (void)s.allocator.resize(s.allocator.context, bytes[kind][k], 0);
+        free(normals);
+        patch_end(&s);
+    }
+}
+
+static void test_point_gpkg(void **state) {
+    (void)state;
+    for (int round = 0; round < 50; round++) {
+        const double xyz[3] = {random_between(-1000000, 1000000) / 7.0, random_between(-1000000, 1000000) / 7.0,
+                               random_between(-1000000, 1000000) / 7.0};
+        const int32_t srid = round % 2 ? 2056 : 0;
+        uint8_t bytes[FORMAT_POINT_BYTES + 8];
+        memset(bytes, 0xA5, sizeof bytes);
+        const size_t size = format_point_gpkg(xyz, srid, bytes);
+        assert_true(size <= FORMAT_POINT_BYTES);
+        for (size_t i = size; i < sizeof bytes; i++) assert_int_equal(bytes[i], 0xA5);
+        reader r = {bytes, bytes + size};
+        assert_memory_equal(take(&r, 4), "GP\0\1", 4);
+        assert_int_equal((int32_t)take_u32(&r), srid ? srid : -1);
+        assert_int_equal(take_byte(&r), 1);
+        assert_int_equal(take_u32(&r), 1001);
+        for (int i = 0; i < 3; i++) assert_true(take_double(&r) == xyz[i]);
+        assert_ptr_equal(r.p, r.end);
+    }
+}
+
 static void test_triangle_gpkg(void **state) {
     (void)state;
     for (int round = 0; round < 200; round++) {
@@ -540,6 +618,8 @@ int main(void) {
         cmocka_unit_test_setup(test_ogr_reads_it, begin),
         cmocka_unit_test_setup(test_spatialite_reads_it, begin),
         cmocka_unit_test_setup(test_triangle_gpkg, begin),
+        cmocka_unit_test_setup(test_ply_normals, begin),
+        cmocka_unit_test_setup(test_point_gpkg, begin),
         cmocka_unit_test_setup(test_ring_gpkg, begin),
         cmocka_unit_test_setup(test_too_large, begin),
         cmocka_unit_test_setup(test_obj_too_large, begin),

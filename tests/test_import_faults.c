@@ -9,7 +9,7 @@
 #include <sys/wait.h>
 
 /* -------------------------------------------------------------------------------------------- refusals -- */
-static void infinity_is_refused_with_its_place(void **unused) {
+static void F13_infinity_is_refused_and_not_a_number_is_void(void **unused) {
     (void)unused;
     double values[8 * 8];
     fill(values, 8, 8, 1);
@@ -18,6 +18,14 @@ static void infinity_is_refused_with_its_place(void **unused) {
     import_options o = defaults();
     import_refused(write_raster(&r, values), file("a.gpkg"), &o, "column 5, row 3 is infinite");
     assert_false(exists(file("a.gpkg")));
+    values[3 * 8 + 5] = NAN; /* declared or not: a void, and counted */
+    for (int declared = 0; declared < 2; declared++) {
+        r.nodata = declared ? "nan" : NULL;
+        VSIUnlink(file("a.gpkg"));
+        import_fine(write_raster(&r, values), file("a.gpkg"), &o);
+        assert_int_equal(report.voids, 1);
+        expect_file_metres(file("a.gpkg"), values);
+    }
 }
 
 static void sources_of_unlike_grids_are_refused(void **unused) {
@@ -148,7 +156,7 @@ static bool dawdle(void *context, const char *stage, double done, int64_t sample
     return true;
 }
 
-static void jobs_do_not_change_a_byte(void **unused) {
+static void F44_jobs_do_not_change_a_byte(void **unused) {
     (void)unused;
     static double values[140 * 120];
     fill(values, 140, 120, 1);
@@ -227,7 +235,7 @@ static void a_new_file_is_a_geopackage_and_an_old_one_stays_what_it_is(void **un
     close_terrain(&t);
 }
 
-static void databases_that_cannot_be_written_get_a_sentence(void **unused) {
+static void F50_databases_that_cannot_be_written_get_a_sentence(void **unused) {
     (void)unused;
     import_options o = defaults();
     const char *source = small_raster("a.tif", 1);
@@ -260,7 +268,7 @@ static void databases_that_cannot_be_written_get_a_sentence(void **unused) {
     import_fine(source, file("busy.db"), &o);
 }
 
-static void a_full_disk_leaves_nothing(void **unused) {
+static void F50_a_full_disk_leaves_nothing(void **unused) {
     (void)unused;
     static double values[300 * 300];
     for (size_t s = 0; s < LENGTH(values); s++) values[s] = rint(uniform() * 30000);
@@ -359,7 +367,7 @@ static bool die_at(void *context, const char *stage, double done, int64_t sample
     return true;
 }
 
-static void a_killed_import_leaves_no_terrain_that_looks_whole(void **unused) {
+static void F49_a_killed_import_leaves_no_terrain_that_looks_whole(void **unused) {
     (void)unused;
     static const stopper moments[] = {{.stage = "reading", .calls = 1},
                                       {.stage = "errors", .calls = 1},
@@ -417,17 +425,17 @@ static void a_killed_import_leaves_no_terrain_that_looks_whole(void **unused) {
 int main(void) {
     const struct CMUnitTest tests[] = {
 #define TEST(name) cmocka_unit_test_setup(name, begin)
-        TEST(infinity_is_refused_with_its_place),
+        TEST(F13_infinity_is_refused_and_not_a_number_is_void),
         TEST(sources_of_unlike_grids_are_refused),
         TEST(bad_sources_get_a_sentence),
         TEST(bad_options_get_a_sentence),
-        TEST(jobs_do_not_change_a_byte),
+        TEST(F44_jobs_do_not_change_a_byte),
         TEST(an_existing_terrain_stays_unless_it_is_to_be_replaced),
         TEST(a_new_file_is_a_geopackage_and_an_old_one_stays_what_it_is),
-        TEST(databases_that_cannot_be_written_get_a_sentence),
-        TEST(a_full_disk_leaves_nothing),
+        TEST(F50_databases_that_cannot_be_written_get_a_sentence),
+        TEST(F50_a_full_disk_leaves_nothing),
         TEST(a_stopped_import_leaves_the_database_as_it_was),
-        TEST(a_killed_import_leaves_no_terrain_that_looks_whole),
+        TEST(F49_a_killed_import_leaves_no_terrain_that_looks_whole),
     };
     alarm(300); /* threads that wait for each other for ever are a failure too */
     return cmocka_run_group_tests(tests, begin_all, end_all);

@@ -348,10 +348,9 @@ static void a_full_disk_stops_the_scratch_file_too(void **unused) {
     struct rlimit before, small;
     getrlimit(RLIMIT_FSIZE, &before);
     small = before;
-    small.rlim_cur = 20000;
     signal(SIGXFSZ, SIG_IGN);
     for (int kept = 0; kept < 2; kept++) {
-        const import_force force = {.two_readings = true, .b = 3, .stage = kept ? -1 : 0, .kept = kept ? 0 : -1};
+        const import_force force = {.in_memory = true, .b = 3, .stage = kept ? -1 : 0, .kept = kept ? 0 : -1};
         const import_options o = defaults();
         small.rlim_cur = kept ? 2000 : 20000;
         setrlimit(RLIMIT_FSIZE, &small);

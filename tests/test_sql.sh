@@ -39,6 +39,7 @@ run() { # title command...
 }
 
 run "tests/sql" "$PYTHON" tests/sql_runner.py tests/sql/*.sql
+run "sql" "$PYTHON" tests/sql_runner.py sql/views.sql sql/layer.sql sql/recipes/*.sql
 for program in tests/test_sql_*.py; do
     run "$program" "$PYTHON" "$program"
 done

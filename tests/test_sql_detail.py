@@ -126,7 +126,7 @@ for title, region, inside in (
         ("F27_border_on_odd_coordinates: area", box(13, -61, 57, -17), lambda x, y: 13 < x < 57 and 17 < y < 61),
         ("a rectangle grows outward to samples", box(13.4, -60.2, 56.5, -17.1), lambda x, y: 13 < x < 57 and 17 < y < 61),
         ("and is cut at the terrain", box(-9.5, -20, 20.5, 30), lambda x, y: x < 21 and y < 20),
-        ("F26 a hole is left out", "POLYGON((10 -10,50 -10,50 -50,10 -50,10 -10),(21 -21,35 -21,35 -33,21 -33,21 -21))",
+        ("F26_a_hole_is_left_out: area", "POLYGON((10 -10,50 -10,50 -50,10 -50,10 -10),(21 -21,35 -21,35 -33,21 -33,21 -21))",
          lambda x, y: 10 < x < 50 and 10 < y < 50 and not (21 < x < 35 and 21 < y < 33)),
         ("all of the terrain", None, lambda x, y: True)):
     for eps in (0, EPS, 1e6):
@@ -134,12 +134,12 @@ for title, region, inside in (
         equal("%s at eps %g" % (title, eps), row[7], half_cells(inside))
         check("... within eps, no crack, nothing uncovered", row[0] <= eps and row[1:4] == (0, 0, 0) and row[5] == 0, row)
 hole = "POLYGON((10 -10,50 -10,50 -50,10 -50,10 -10),(10 -10,50 -10,50 -50,10 -50,10 -10))"
-equal("F26 a hole that covers all leaves nothing", (mesh(db, hole, 5), mesh(db, hole, 5, mode="border")), ([], []))
+equal("F26_a_hole_that_covers_all_leaves_nothing", (mesh(db, hole, 5), mesh(db, hole, 5, mode="border")), ([], []))
 for title, region in (("a point", "POINT(33.5 -20.25)"), ("a line", "LINESTRING(3 -3, 70 -70.5)")):
-    equal("F24 %s has no border: it is covered" % title, mesh(db, region, EPS, mode="border"), mesh(db, region, EPS))
-equal("F24 outside there is nothing", mesh(db, box(200, 5, 300, 9), EPS, mode="border"), [])
+    equal("F24_lines_and_points_are_covered: %s" % title, mesh(db, region, EPS, mode="border"), mesh(db, region, EPS))
+equal("F24_outside_there_is_nothing", mesh(db, box(200, 5, 300, 9), EPS, mode="border"), [])
 thin = proof(db, box(30.3, -50, 30.4, -20), 1e6, mode="border")
-equal("F24 a rectangle thinner than a cell is grown to one", thin[7], half_cells(lambda x, y: 30 < x < 31 and 20 < y < 50))
+equal("F24_a_rectangle_thinner_than_a_cell_is_grown_to_one", thin[7], half_cells(lambda x, y: 30 < x < 31 and 20 < y < 50))
 both = proof(db, box(13, -61, 57, -17), EPS, mode="border", detail=listed)
 check("border and detail go together", both[0] <= EPS and both[1:4] == (0, 0, 0) and both[7] == half_cells(lambda x, y: 13 < x < 57 and 17 < y < 61), both)
 for given in ({"mode": "cut"}, {"mode": "snap"}, {"outline": "tol"}, {"mode": "border", "outline": "tol"}, {"mode": "cut", "outline": "tol"}):

@@ -46,6 +46,7 @@ def compare(title, db, region, eps, srid):
         found = guarded(name, lambda: read(mesh(form)))
         if found is not None:
             equal(name + " holds the triangles", multiset(found), multiset(expected))
+    equal(title + ": a ply says its CRS to QGIS", b"\ncomment crs: EPSG:%d\n" % srid in mesh("ply").split(b"end_header")[0], srid != 0)
     name = title + ": gpkg"
     answer = guarded(name, lambda: s.gpkg_triangles(mesh("gpkg")))
     if answer:

@@ -101,11 +101,11 @@ db.close()
 db = s.connect(path)
 open_cursor = db.execute("SELECT * FROM rqt_triangles(NULL, 0)")
 open_cursor.fetchone()
-s.raises("VACUUM while a query runs is SQLite's own refusal", "SQL statements in progress", lambda: db.execute("VACUUM"))
+s.raises("F53 VACUUM while a query runs is SQLite's own refusal", "SQL statements in progress", lambda: db.execute("VACUUM"))
 open_cursor.close()
 rows(db, COUNT), one(db, "SELECT rqt_height(3, -3)"), one(db, "SELECT length(rqt_mesh(NULL, 1, 'ply'))")
 db.execute("VACUUM")
-equal("VACUUM after use, and the same mesh after it", triangles(db, None, 2), before)
+equal("F53 VACUUM after use, and the same mesh after it", triangles(db, None, 2), before)
 db.execute("CREATE TABLE notes(x)")
 db.execute("DROP TABLE notes")
 equal("the schema may change between queries", triangles(db, None, 2), before)
@@ -138,7 +138,7 @@ if os.path.isdir("/proc/self/fd"):
             except sqlite3.Error:
                 pass
         db.close()
-        equal("the connection closes after use of %s, and lets go of the file" % title, open_files(first), [])
+        equal("F53 the connection closes after use of %s, and lets go of the file" % title, open_files(first), [])
 
 # ------------------------------------------------------------------------------------------- readers and a writer; WAL
 shutil.copy(first, path)
@@ -147,7 +147,7 @@ db.execute("PRAGMA journal_mode = WAL")
 db.execute("BEGIN")
 equal("a reader's snapshot", triangles(db, None, 2), before)
 writer.execute("UPDATE rqt_terrain SET height_offset = height_offset + 5")
-equal("stays what it was while another connection commits", triangles(db, None, 2), before)
+equal("F51 a snapshot stays what it was while another connection commits", triangles(db, None, 2), before)
 db.execute("COMMIT")
 equal("and is new in the next transaction", [t[0][2] for t in triangles(db, None, 2)], [t[0][2] + 5 for t in before])
 db.close()
@@ -185,7 +185,7 @@ for attempt in range(20):
     seen[-1] += " in %.3f s of %.3f s" % (took, whole)
     if early:
         break
-check("a query whose blocks are all cached can be interrupted, and then stops early", early, seen)
+check("F54 a query whose blocks are all cached can be interrupted, and then stops early", early, seen)
 db.close()
 
 for title, sql in (("rqt_triangles", "SELECT * FROM rqt_triangles(NULL, 0)"), ("rqt_verify", "SELECT * FROM rqt_verify(NULL, 0)"),
@@ -214,8 +214,8 @@ for title, sql in (("rqt_triangles", "SELECT * FROM rqt_triangles(NULL, 0)"), ("
         db.close()
         if early:
             break
-    check("%s can be interrupted, and then stops early" % title, early, seen)
-    equal("%s: the same connection answers the next query" % title, answers, [2] * len(answers))
+    check("F54 %s can be interrupted, and then stops early" % title, early, seen)
+    equal("F54 %s: the same connection answers the next query" % title, answers, [2] * len(answers))
 
 for name in (first, second, path, large):
     db = s.connect(name)

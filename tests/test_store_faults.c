@@ -109,6 +109,15 @@ static int read_everything(sqlite3 *db, const expected *right, const char **step
         code = store_window(s, t, 3, 2, 4, 3, q, valid, &error);
     }
     if (code == SQLITE_OK) {
+        *step = "normals";
+        rqt_patch_vertex vertices[] = {{.col = 0, .row = 0}, {.col = 4, .row = 4}, {.col = 3, .row = 2}};
+        const rqt_patch patch = {.vertices = vertices, .vertex_count = 3};
+        float *normals = NULL;
+        code = store_normals(s, t, &patch, &normals, &error);
+        if (code == SQLITE_OK && !(normals[2] > 0 && normals[5] > 0 && normals[8] > 0)) code = -1;
+        sqlite3_free(normals);
+    }
+    if (code == SQLITE_OK) {
         *step = "list";
         store_terrain *all;
         int count;
@@ -197,7 +206,7 @@ static void starve(const char *path, const expected *right,
     }
 }
 
-static void memory_may_run_out_anywhere(void **state) {
+static void F48_memory_may_run_out_anywhere(void **state) {
     (void)state;
     char path[128];
     sqlite3 *db = open_database(scratch_file(path, "memory.db"));
@@ -225,7 +234,7 @@ static void memory_may_run_out_anywhere(void **state) {
 
 /* ------------------------------------------------------------------------------------------- damaged blobs */
 
-static void every_byte_of_a_block_and_of_a_summary_counts(void **state) {
+static void F42_every_byte_of_a_block_and_of_a_summary_counts(void **state) {
     (void)state;
     sqlite3 *db = memory_terrain(5, 5, 2, false);
     const answer right = query_database(db, 0, by_threshold);
@@ -263,7 +272,7 @@ static void every_byte_of_a_block_and_of_a_summary_counts(void **state) {
     sqlite3_close(db);
 }
 
-static void a_damaged_terrain_gives_an_error_or_the_right_answer(void **state) {
+static void F55_a_damaged_terrain_gives_an_error_or_the_right_answer(void **state) {
     (void)state;
     static const char *const damages[] = {
         "DELETE FROM rqt_block_1 WHERE id = 268",
@@ -361,7 +370,7 @@ static void a_hole_in_the_index_is_noticed_by_points_and_lines(void **state) {
     sqlite3_close(db);
 }
 
-static void absurd_rows_crash_nothing(void **state) {
+static void F55_absurd_rows_crash_nothing(void **state) {
     (void)state;
     static const char *const columns[] = {"id",
                                           "name",
@@ -567,7 +576,7 @@ static void rows_that_we_change_and_roll_back_are_not_remembered(void **state) {
     assert_int_equal(sqlite3_close(db), SQLITE_OK);
 }
 
-static void vacuum_and_close_succeed_after_queries(void **state) {
+static void F53_vacuum_and_close_succeed_after_queries(void **state) {
     (void)state;
     char path[128];
     sqlite3 *db = open_database(scratch_file(path, "vacuum.db"));
@@ -600,7 +609,7 @@ static int interrupt_soon(void *db) {
 }
 
 /* As a query runs inside a host: a statement is under way all the time, or SQLite forgets the interrupt. */
-static void an_interrupt_stops_a_query_and_leaves_nothing_behind(void **state) {
+static void F54_an_interrupt_stops_a_query_and_leaves_nothing_behind(void **state) {
     (void)state;
     sqlite3 *db = memory_terrain(65, 65, 2, false);
     const answer right = query_database(db, 0, by_threshold);
@@ -730,7 +739,7 @@ static void *read_on(void *context) {
     return NULL;
 }
 
-static void two_readers_and_a_writer_never_see_half_a_terrain(void **state) {
+static void F51_two_readers_and_a_writer_never_see_half_a_terrain(void **state) {
     (void)state;
     char path[128];
     answer right[VERSIONS];
@@ -769,18 +778,18 @@ static void two_readers_and_a_writer_never_see_half_a_terrain(void **state) {
 int main(void) {
     if (!install_memory()) return 1;
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(memory_may_run_out_anywhere),
-        cmocka_unit_test(every_byte_of_a_block_and_of_a_summary_counts),
-        cmocka_unit_test(a_damaged_terrain_gives_an_error_or_the_right_answer),
+        cmocka_unit_test(F48_memory_may_run_out_anywhere),
+        cmocka_unit_test(F42_every_byte_of_a_block_and_of_a_summary_counts),
+        cmocka_unit_test(F55_a_damaged_terrain_gives_an_error_or_the_right_answer),
         cmocka_unit_test(a_hole_in_the_index_is_noticed_by_points_and_lines),
-        cmocka_unit_test(absurd_rows_crash_nothing),
+        cmocka_unit_test(F55_absurd_rows_crash_nothing),
         cmocka_unit_test(a_change_by_another_connection_is_seen_at_once),
         cmocka_unit_test(a_transaction_of_our_own_is_seen_and_its_rollback_too),
         cmocka_unit_test(rows_that_we_change_and_roll_back_are_not_remembered),
-        cmocka_unit_test(vacuum_and_close_succeed_after_queries),
-        cmocka_unit_test(an_interrupt_stops_a_query_and_leaves_nothing_behind),
+        cmocka_unit_test(F53_vacuum_and_close_succeed_after_queries),
+        cmocka_unit_test(F54_an_interrupt_stops_a_query_and_leaves_nothing_behind),
         cmocka_unit_test(a_commit_in_the_middle_of_a_query_is_not_mixed_in),
-        cmocka_unit_test(two_readers_and_a_writer_never_see_half_a_terrain),
+        cmocka_unit_test(F51_two_readers_and_a_writer_never_see_half_a_terrain),
     };
     return cmocka_run_group_tests_name("store faults", tests, make_scratch, drop_scratch);
 }

@@ -205,7 +205,7 @@ static void starve(const char *path, int (*work)(sqlite3 *db, const char **step)
     }
 }
 
-static void memory_may_run_out_anywhere(void **state) {
+static void F48_memory_may_run_out_anywhere(void **state) {
     (void)state;
     char path[128];
     sqlite3 *db = open_database(scratch_file(path, "methods.db"));
@@ -304,7 +304,7 @@ int main(void) {
         cmocka_unit_test(too_little_memory_is_a_sentence_that_says_how_much),
         cmocka_unit_test(metrics_make_room_for_each_other_within_the_limit),
         cmocka_unit_test(a_change_of_the_database_gives_the_memory_back),
-        cmocka_unit_test(memory_may_run_out_anywhere),
+        cmocka_unit_test(F48_memory_may_run_out_anywhere),
         cmocka_unit_test(minimal_errors_are_stored_once_whole_or_not_at_all),
         cmocka_unit_test(an_interrupt_stops_computing),
     };

@@ -23,7 +23,8 @@ typedef struct cli_command {
     int (*run)(int argc, char **argv);
 } cli_command;
 
-extern const cli_command command_import, command_info, command_check, command_verify, command_mesh, command_chart;
+extern const cli_command command_import, command_update, command_info, command_check, command_verify, command_mesh,
+    command_chart;
 
 /* ------------------------------------------------------------------------------------ sentences (main.c) -- */
 /* The command whose name goes before every sentence. */

@@ -11,9 +11,18 @@ static const char HELP[] =
     "\n"
     "Usage: rqt import [OPTION...] SOURCE... DATABASE\n"
     "\n"
-    "SOURCE is whatever GDAL reads: GeoTIFF, .hgt (zipped too), ESRI ASCII grid, USGS DEM ... Several sources are\n"
-    "put together; where they overlap and differ, the later one wins. DATABASE is an SQLite file, made as a\n"
+    "SOURCE is whatever GDAL reads: GeoTIFF, .hgt (zipped too), VRT, ESRI ASCII grid, USGS DEM ...; or a folder, "
+    "of\n"
+    "which all rasters are taken, those in its folders too, in the order of their paths; or @FILE, a list of "
+    "them,\n"
+    "one a line, as seen from the list. They are put together on one grid; where they overlap and differ, the "
+    "later\n"
+    "one wins, and gaps, overlaps and differences are told, with places. DATABASE is an SQLite file, made as a\n"
     "GeoPackage when it does not exist. An import that fails or is stopped leaves it as it was.\n"
+    "\n"
+    "What does not fit in memory is kept while it is read, in DATABASE.NAME.rqt-import: after a kill or Ctrl-C "
+    "the\n"
+    "same command goes on where reading was, and reads no tile again. With success the file goes.\n"
     "\n"
     "Options:\n"
     "  --name N        name of the terrain (default: the first source's file name, up to its first dot)\n"
@@ -21,8 +30,13 @@ static const char HELP[] =
     "  --nodata V      samples of this value are voids, too\n"
     "  --unit U        unit of the heights: m, ft, us-ft or a number of metres (default: what the raster says)\n"
     "  --quantum Q     height step for rasters of floating-point numbers (default: chosen from the samples)\n"
-    "  --void-tol R    metres of void outline that may be lost for each metre of eps (default 1; for the outline\n"
-    "                  option of a later version; stored with the errors)\n"
+    "  --void-tol R    c: with the option outline tol, an outline of voids moves by at most c * eps metres on the\n"
+    "                  ground (default 1). Stored with the errors; outline exact does not depend on it\n"
+    "  --fill R        voids that a square of 2R + 1 samples holds become heights, between their neighbours west,\n"
+    "                  east, north and south, by inverse distance; R is 1 to 255. Noted in the table rqt_fill_N\n"
+    "  --sea Z         every void that is left, missing tiles too, becomes Z metres. Noted likewise\n"
+    "  --report FILE   gaps, overlaps and differences of the sources as GeoJSON, which QGIS opens\n"
+    "  --resumable     keep what is read for resuming even where it fits in memory\n"
     "  --minimal       store minimal errors, too, so that the option metric minimal need not compute them; "
     "doubles\n"
     "                  the database, and takes about 12 bytes of memory a sample, 512 MiB at most\n"
@@ -36,9 +50,25 @@ static const char HELP[] =
     "Examples:\n"
     "  rqt import N44W072.hgt.zip washington.gpkg\n"
     "  rqt import --name pyrenees N42E001.hgt.zip N41E001.hgt.zip mountains.gpkg\n"
-    "  rqt import --nodata -9999 --unit ft --replace survey.tif county.gpkg\n";
+    "  rqt import --nodata -9999 --unit ft --replace survey.tif county.gpkg\n"
+    "  rqt import --fill 3 --report faults.geojson tiles/ country.gpkg\n";
 
-enum { NAME = 1000, BLOCK, NODATA, UNIT, QUANTUM, VOID_TOL, MINIMAL, JOBS, MEMORY, REPLACE };
+enum {
+    NAME = 1000,
+    BLOCK,
+    NODATA,
+    UNIT,
+    QUANTUM,
+    VOID_TOL,
+    FILL,
+    SEA,
+    REPORT,
+    RESUMABLE,
+    MINIMAL,
+    JOBS,
+    MEMORY,
+    REPLACE
+};
 
 static const struct option OPTIONS[] = {{"name", required_argument, NULL, NAME},
                                         {"block", required_argument, NULL, BLOCK},
@@ -46,6 +76,10 @@ static const struct option OPTIONS[] = {{"name", required_argument, NULL, NAME},
                                         {"unit", required_argument, NULL, UNIT},
                                         {"quantum", required_argument, NULL, QUANTUM},
                                         {"void-tol", required_argument, NULL, VOID_TOL},
+                                        {"fill", required_argument, NULL, FILL},
+                                        {"sea", required_argument, NULL, SEA},
+                                        {"report", required_argument, NULL, REPORT},
+                                        {"resumable", no_argument, NULL, RESUMABLE},
                                         {"minimal", no_argument, NULL, MINIMAL},
                                         {"jobs", required_argument, NULL, JOBS},
                                         {"memory", required_argument, NULL, MEMORY},
@@ -112,6 +146,25 @@ static int set_option(import_options *o, int option) {
             return cli_usage("--void-tol %s: metres of outline for each metre of eps, a number above 0", optarg);
         o->void_tol = number;
         return CLI_OK;
+    case FILL:
+        if (!cli_integer(optarg, 1, IMPORT_MOST_FILL, &n))
+            return cli_usage("--fill %s: a radius in samples, a whole number from 1 to %d", optarg,
+                             IMPORT_MOST_FILL);
+        o->fill = (int)n;
+        return CLI_OK;
+    case SEA:
+        if (!cli_number(optarg, &number) || !isfinite(number))
+            return cli_usage("--sea %s is no height in metres", optarg);
+        o->has_sea = true;
+        o->sea = number;
+        return CLI_OK;
+    case REPORT:
+        if (!*optarg) return cli_usage("--report needs the name of a file");
+        o->report = optarg;
+        return CLI_OK;
+    case RESUMABLE:
+        o->resumable = true;
+        return CLI_OK;
     case JOBS:
         if (!cli_integer(optarg, 1, 1024, &n)) return cli_usage("--jobs %s: a whole number from 1 to 1024", optarg);
         o->jobs = (int)n;
@@ -144,6 +197,14 @@ static void print_report(const import_report *r, double seconds) {
     printf("  %.2f s (reading %.2f, errors and blocks %.2f, writing %.2f), %.1f Msamples/s\n", seconds,
            r->seconds_read, r->seconds_errors, r->seconds_blocks,
            samples / (seconds > 1e-9 ? seconds : 1e-9) / 1e6);
+    if (r->sources > 1 || r->samples_resumed) {
+        printf("  %s samples read from %s source%s", cli_count(r->samples_read), cli_count(r->sources),
+               r->sources == 1 ? "" : "s");
+        if (r->samples_resumed) printf("; %s from an earlier run", cli_count(r->samples_resumed));
+        putchar('\n');
+    }
+    if (r->filled) printf("  %s void samples filled\n", cli_count(r->filled));
+    if (r->sea) printf("  %s void samples made sea\n", cli_count(r->sea));
     if (r->overlap)
         printf("  %s samples in more than one source, %s of them differ\n", cli_count(r->overlap),
                cli_count(r->overlap_differs));

@@ -16,7 +16,7 @@ static const char HELP[] =
     "Usage: rqt mesh DATABASE --eps E [OPTION...] -o FILE\n"
     "\n"
     "The ending of FILE says what it will be:\n"
-    "  .obj .ply       a model: x, y in the terrain's coordinates, z in metres, up\n"
+    "  .obj .ply       a model: x, y in the terrain's coordinates, z in metres, up; .ply is a mesh layer to QGIS\n"
     "  .gpkg           a GeoPackage with a layer of 3D triangles, for QGIS and OGR\n"
     "  .svg .png       a picture: shaded relief and the mesh over it, with its true error; a panel for each eps\n"
     "\n"
@@ -24,6 +24,7 @@ static const char HELP[] =
     "  --eps E         tolerance in metres of height; for pictures a list, too: 5,20,80\n"
     "  --region R      x0,y0,x1,y1 or WKT, in the terrain's coordinates (default: all)\n"
     "  --terrain T     which terrain (default: the only one)\n"
+    "  --normals       with the terrain's normal at each vertex, from its full-resolution samples; for .ply\n"
     "  --mode M        what happens at the region's border: cover, the default: every triangle that has a part of\n"
     "                  its inside in the region, whole; snap: the same of the region grown to squares of a power "
     "of\n"
@@ -42,15 +43,12 @@ static const char HELP[] =
 
 enum { DEFAULT_WIDTH = 1800, LEAST_WIDTH = 1200, LARGEST_WIDTH = 12000 };
 
-static const struct option OPTIONS[] = {{"eps", required_argument, NULL, 'e'},
-                                        {"region", required_argument, NULL, 'r'},
-                                        {"terrain", required_argument, NULL, 't'},
-                                        {"mode", required_argument, NULL, 'm'},
-                                        {"output", required_argument, NULL, 'o'},
-                                        {"width", required_argument, NULL, 'w'},
-                                        {"outline", required_argument, NULL, 'O'},
-                                        {"help", no_argument, NULL, 'h'},
-                                        {NULL, 0, NULL, 0}};
+static const struct option OPTIONS[] = {
+    {"eps", required_argument, NULL, 'e'},     {"region", required_argument, NULL, 'r'},
+    {"terrain", required_argument, NULL, 't'}, {"mode", required_argument, NULL, 'm'},
+    {"output", required_argument, NULL, 'o'},  {"width", required_argument, NULL, 'w'},
+    {"normals", no_argument, NULL, 'n'},       {"outline", required_argument, NULL, 'O'},
+    {"help", no_argument, NULL, 'h'},          {NULL, 0, NULL, 0}};
 
 typedef enum kind { NO_KIND, OBJ, PLY, GPKG, SVG, PNG } kind;
 
@@ -60,6 +58,7 @@ typedef struct request {
     const char *options; /* of the SQL functions, JSON */
     double eps[CLI_MAX_EPS];
     int count, width;
+    bool normals;
     kind kind;
 } request;
 
@@ -85,7 +84,7 @@ static int write_bytes(sqlite3 *db, const request *r, const char *region, const 
     sqlite3_stmt *row = cli_prepare(db, "SELECT rqt_mesh(?1, ?2, ?4, ?3, ?5)");
     if (!row) return CLI_FAILED;
     cli_bind_query(row, region, r->eps[0], r->terrain);
-    sqlite3_bind_text(row, 4, r->kind == OBJ ? "obj" : "ply", -1, SQLITE_STATIC);
+    sqlite3_bind_text(row, 4, r->kind == OBJ ? "obj" : r->normals ? "ply+normals" : "ply", -1, SQLITE_STATIC);
     sqlite3_bind_text(row, 5, r->options, -1, SQLITE_STATIC);
     int status = CLI_FAILED;
     if (sqlite3_step(row) == SQLITE_ROW) {
@@ -135,6 +134,9 @@ static int set_option(request *r, int option) {
     case 'o':
         r->output = optarg;
         return CLI_OK;
+    case 'n':
+        r->normals = true;
+        return CLI_OK;
     case 'w':
         if (!cli_integer(optarg, LEAST_WIDTH, LARGEST_WIDTH, &n))
             return cli_usage("--width %s: a whole number of pixels from %d to %d", optarg, LEAST_WIDTH,
@@ -160,6 +162,7 @@ static int run(int argc, char **argv) {
     if (!r.count) return cli_usage("--eps is missing: the tolerance in metres");
     if (!r.output) return cli_usage("-o is missing: the file to write");
     if ((r.kind = kind_of(r.output)) == NO_KIND) return CLI_USAGE;
+    if (r.normals && r.kind != PLY) return cli_usage("%s holds no normals; a .ply does", r.output);
     if (r.count > 1 && r.kind != SVG && r.kind != PNG)
         return cli_usage("%s holds one mesh, so --eps takes one number here; a list is for .svg and .png",
                          r.output);

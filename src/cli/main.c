@@ -11,12 +11,12 @@
 #include <stdio.h>
 #include <string.h>
 
-static const cli_command *const COMMANDS[] = {&command_import, &command_info, &command_check,
-                                              &command_verify, &command_mesh, &command_chart};
+static const cli_command *const COMMANDS[] = {&command_import, &command_update, &command_info, &command_check,
+                                              &command_verify, &command_mesh,   &command_chart};
 enum { COMMAND_COUNT = sizeof COMMANDS / sizeof *COMMANDS };
 
 /* In the contract of the command line, and still to come. */
-static const char *const LATER[] = {"update", "serve"};
+static const char *const LATER[] = {"serve"};
 
 const cli_command *cli_current;
 
@@ -89,7 +89,7 @@ static const cli_command *find(const char *name) {
 }
 
 static int dispatch(int argc, char **argv) {
-    if (argc < 2) return cli_usage("a command is missing: import, info, check, verify, mesh or chart");
+    if (argc < 2) return cli_usage("a command is missing: import, update, info, check, verify, mesh or chart");
     const char *name = argv[1];
     if (!strcmp(name, "--help") || !strcmp(name, "-h") || (!strcmp(name, "help") && argc == 2))
         return help_of_all();
@@ -100,7 +100,7 @@ static int dispatch(int argc, char **argv) {
         if (!strcmp(name, LATER[i])) return cli_usage("the command %s is not in this version", name);
     const cli_command *command = find(name);
     if (!command)
-        return cli_usage("there is no %s %s: the commands are import, info, check, verify, mesh and chart",
+        return cli_usage("there is no %s %s: the commands are import, update, info, check, verify, mesh and chart",
                          name[0] == '-' ? "option" : "command", name);
     cli_current = command;
     char ask[] = "--help", *const asking[] = {argv[1], ask, NULL};

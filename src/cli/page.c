@@ -205,8 +205,8 @@ static void draw_header(const picture_page *page, cairo_t *cr, double unit) {
     else
         snprintf(text, sizeof text, "%d × %d samples", t->lattice.width, t->lattice.height);
     if (*t->crs) {
-        strcat(text, "   ·   ");
-        strncat(text, cli_crs_label(t), 80);
+        const size_t n = strlen(text);
+        snprintf(text + n, sizeof text - n, "   ·   %.80s", cli_crs_label(t));
     }
     write_text(cr, left, (MARGIN + 82) * unit, 0, room, 17 * unit, false, text);
     draw_legend(page, cr, unit, right);
@@ -383,7 +383,8 @@ void picture_draw(const picture_page *page, cairo_t *cr, bool lines) {
     draw_header(page, cr, unit);
     for (int i = 0; i < page->count; i++) {
         const double x = MARGIN * unit + (i % columns) * (slot + GAP * unit) + (slot - w->panel_width) / 2;
-        const double y = (MARGIN + HEADER) * unit + (i / columns) * (w->panel_height + CAPTION * unit);
+        const int row = i / columns;
+        const double y = (MARGIN + HEADER) * unit + row * (w->panel_height + CAPTION * unit);
         cairo_save(cr);
         cairo_translate(cr, floor(x), floor(y)); /* images then lie on the page's pixels */
         draw_panel(page, cr, &page->meshes[i], lines, i == 0, slot, unit);

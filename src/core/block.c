@@ -59,6 +59,8 @@ void block_settle_past(rqt_block *b) {
                         const int32_t y = v + (kind ? (c == 2 ? -q : c == 3 ? q : 0) : c & 2 ? h : -h);
                         if (x < 0 || y < 0 || x >= n || y >= n) continue;
                         const ptrdiff_t from = (ptrdiff_t)y * n + x;
+                        /* What a sparse block does not keep, its bytes do not depend on. */
+                        if (b->sparse && b->error[from] <= b->floor && !(b->flags[from] & RQT_OUTLINE)) continue;
                         if (b->error[from] > b->error[at]) b->error[at] = b->error[from];
                         b->flags[at] = (uint8_t)(b->flags[at] | (b->flags[from] & RQT_OUTLINE));
                     }

@@ -76,10 +76,11 @@ VECTOR_CLONES uint32_t restore_heights(const uint8_t *planes, size_t stored, int
         uint32_t *r = (uint32_t *)q + (ptrdiff_t)y * side;
         get_planes(planes, stored, count, width, residual);
         if (y == 0) {
+            /* get_planes has set `width` of them. NOLINTNEXTLINE(clang-analyzer-core.CallAndMessage) */
             for (int32_t x = 0; x < width; x++) r[x] = unzigzag32(residual[x]);
         } else {
             const uint32_t *above = r - side;
-            r[0] = unzigzag32(residual[0]) + above[0];
+            r[0] = unzigzag32(residual[0]) + above[0]; /* as well. NOLINT(clang-analyzer-core.CallAndMessage) */
             for (int32_t x = 1; x < width - 1; x++)
                 r[x] = unzigzag32(residual[x]) + slope(above[x - 1], above[x], above[x + 1]);
             if (width > 1) {

@@ -1,12 +1,13 @@
 /* cut_faces.c - one leaf of a cut: a triangulation with edges that have to be there, on integers.
  *
- * A point goes where it belongs: into a face, which becomes three, or onto an edge, whose faces become two each. A
- * segment between two points is made an edge by taking out all faces that it passes through and filling the two
- * holes on its sides: each is bounded by a chain of edges every vertex of which sees the segment, so that a scan
- * along the chain which closes every corner that turns inward tiles it (Toussaint and Avis, "On a convex hull
- * algorithm for polygons and its application to triangulation problems", 1982). Where it meets a point on its way
- * it goes on from there. Where it crosses an edge that has to stay, both get a point at the crossing, rounded to
- * the grid; the four parts then lead there, a bit off their lines.
+ * A point goes where it belongs: into a face, which becomes three, or onto an edge, whose faces become two each;
+ * then edges around it that need not stay are turned where that makes faces rounder. A segment between two points
+ * is made an edge by taking out all faces that it passes through and filling the two holes on its sides: each is
+ * bounded by a chain of edges every vertex of which sees the segment, so that a scan along the chain which closes
+ * every corner that turns inward tiles it (Toussaint and Avis, "On a convex hull algorithm for polygons and its
+ * application to triangulation problems", 1982). Where it meets a point on its way it goes on from there. Where it
+ * crosses an edge that has to stay, both get a point at the crossing, rounded to the grid; the four parts then lead
+ * there, a bit off their lines.
  *
  * Why rounding cannot break it. After every step the faces tile the leaf, share whole edges and have an area above
  * 0: steps are decided with the points as they are, never with the places they should have. What rounding moves is
@@ -169,6 +170,61 @@ static void split_face(cut_faces *f, uint32_t face, uint32_t point) {
     }
 }
 
+static int corner_of(const cut_face *t, uint32_t point) {
+    return t->corner[0] == point ? 0 : t->corner[1] == point ? 1 : 2;
+}
+
+/* ---------------------------------------------------------------------------------------------- shape */
+
+/* Is p well within the circle through a, b, c? In doubles: a wrong answer costs beauty only. */
+static bool is_in_circle(region_point a, region_point b, region_point c, region_point p) {
+    const double ax = (double)(a.x - p.x), ay = (double)(a.y - p.y), bx = (double)(b.x - p.x),
+                 by = (double)(b.y - p.y), cx = (double)(c.x - p.x), cy = (double)(c.y - p.y);
+    const double one = (ax * ax + ay * ay) * (bx * cy - cx * by), two = (bx * bx + by * by) * (cx * ay - ax * cy),
+                 three = (cx * cx + cy * cy) * (ax * by - bx * ay);
+    const double size = (one < 0 ? -one : one) + (two < 0 ? -two : two) + (three < 0 ? -three : three);
+    return one + two + three > 1e-9 * size;
+}
+
+/* The edge opposite to a new point, if it need not stay, gives way to the other diagonal where that makes rounder
+ * faces (Lawson). *other: the face beyond, when it did. */
+static bool flip(cut_faces *f, uint32_t face, uint32_t point, uint32_t *other) {
+    const cut_face t = f->faces[face];
+    const int k = corner_of(&t, point), i = next_corner(k), j = next_corner(i);
+    if (t.fixed[i] || t.next[i] == CUT_NO_FACE) return false;
+    *other = t.next[i];
+    const cut_face n = f->faces[*other];
+    const uint32_t a = t.corner[i], b = t.corner[j];
+    const int from_a = corner_of(&n, a), from_o = next_corner(from_a);
+    const uint32_t o = n.corner[from_o];
+    const region_point *p = f->points;
+    if (region_side(p[a], p[o], p[point]) <= 0 || region_side(p[o], p[b], p[point]) <= 0) return false;
+    if (!is_in_circle(p[a], p[b], p[point], p[o])) return false;
+    put_face(f, face, a, o, point);
+    put_face(f, *other, o, b, point);
+    join(f, face, 0, n.next[from_a], n.fixed[from_a]);
+    join(f, face, 2, t.next[k], t.fixed[k]);
+    join(f, *other, 0, n.next[from_o], n.fixed[from_o]);
+    join(f, *other, 1, t.next[j], t.fixed[j]);
+    join(f, face, 1, *other, false);
+    return true;
+}
+
+/* Slivers make long ways through many faces, and ugly meshes. Faces that have the new point are in f->pairs; how
+ * often is bounded, as doubles could go round in circles. */
+static bool make_round(cut_faces *f, uint32_t point) {
+    for (int flips = 0; f->pair_count > 0 && flips < 256;) {
+        const uint32_t face = f->pairs[--f->pair_count];
+        uint32_t other;
+        if (!flip(f, face, point, &other)) continue;
+        flips++;
+        if (!ROOM(f, pairs, pair_capacity, f->pair_count + 2)) return false;
+        f->pairs[f->pair_count++] = face;
+        f->pairs[f->pair_count++] = other;
+    }
+    return true;
+}
+
 bool cut_faces_add(cut_faces *f, region_point place, uint32_t *point) {
     const uint32_t face = find_face(f, place);
     *point = 0;
@@ -184,12 +240,20 @@ bool cut_faces_add(cut_faces *f, region_point place, uint32_t *point) {
         }
         if (region_side(*p, f->points[t->corner[next_corner(i)]], place) == 0) on = i;
     }
-    if (!ROOM(f, faces, face_capacity, f->face_count + 2) || !new_point(f, place, point)) return false;
+    if (!ROOM(f, faces, face_capacity, f->face_count + 2) || !ROOM(f, pairs, pair_capacity, 4) ||
+        !new_point(f, place, point))
+        return false;
+    f->pair_count = 0;
+    f->pairs[f->pair_count++] = face;
+    const uint32_t beyond = on >= 0 ? f->faces[face].next[on] : CUT_NO_FACE;
+    if (beyond != CUT_NO_FACE) f->pairs[f->pair_count++] = beyond;
+    uint32_t fresh = (uint32_t)f->face_count;
     if (on >= 0)
         split_edge(f, face, on, *point);
     else
         split_face(f, face, *point);
-    return true;
+    while (fresh < f->face_count) f->pairs[f->pair_count++] = fresh++;
+    return make_round(f, *point);
 }
 
 /* ------------------------------------------------------------------------------------------------ edges */
@@ -204,10 +268,6 @@ typedef struct departure {
     int at;         /* which corner of the face the point is */
     uint32_t along; /* the point that an edge in its direction leads to; CUT_NO_FACE: it passes between two */
 } departure;
-
-static int corner_of(const cut_face *t, uint32_t point) {
-    return t->corner[0] == point ? 0 : t->corner[1] == point ? 1 : 2;
-}
 
 static departure depart(const cut_faces *f, uint32_t from, uint32_t to) {
     const region_point a = f->points[from], b = f->points[to];

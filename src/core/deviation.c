@@ -131,13 +131,18 @@ static uint64_t plane_deviation(const deviation_field *s, const plane_triangle *
     uint64_t most = 0;
     const int pieces = spans_of(&p->t, &box, window, first, spans);
     for (int i = 0; i < pieces; i++) {
-        const int32_t *z = s->q + sample_index(s, 0, first[i]);
-        const size_t stride = (size_t)s->width;
-        /* times 2^m, at column 0 of the first row */
-        const int64_t start = p->apex * ((int64_t)1 << m) - g.gx * a.x + g.gy * (first[i] - a.y);
+        const int32_t *z = s->q + sample_index(s, s->first_column, first[i]);
+        row_spans here = spans[i]; /* counted from the first column at hand */
+        here.left -= s->first_column;
+        here.right -= s->first_column;
+        here.low -= s->first_column;
+        here.high -= s->first_column;
+        /* times 2^m, at that column of the first row */
+        const int64_t start =
+            p->apex * ((int64_t)1 << m) - g.gx * (a.x - s->first_column) + g.gy * (first[i] - a.y);
         const uint64_t d =
-            narrow ? s->kernels->rows_32(z, stride, &spans[i], m, (uint32_t)start, (uint32_t)g.gx, (uint32_t)g.gy)
-                   : s->kernels->rows_64(z, stride, &spans[i], m, start, g.gx, g.gy);
+            narrow ? s->kernels->rows_32(z, s->stride, &here, m, (uint32_t)start, (uint32_t)g.gx, (uint32_t)g.gy)
+                   : s->kernels->rows_64(z, s->stride, &here, m, start, g.gx, g.gy);
         if (d > most) most = d;
     }
     return most;
@@ -173,16 +178,7 @@ static int64_t floor_divide(int64_t a, int64_t b) {
     return a / b - (a % b != 0 && (a % b < 0) != (b < 0));
 }
 
-/* A clamped triangle: any triangle of samples, counter-clockwise or made so. */
-typedef struct sample_triangle {
-    rqt_vertex corner[4]; /* the first one again at the end */
-    int64_t area;         /* twice */
-    __int128 gx, gy;      /* gradients times `area` */
-    int32_t base;         /* height of the first corner */
-    bool in_doubles;      /* its plane is exact in doubles: every term and sum is below 2^53 */
-} sample_triangle;
-
-static sample_triangle sample_triangle_of(const deviation_field *s, const plane_triangle *p) {
+sample_triangle sample_triangle_of(const deviation_field *s, const plane_triangle *p) {
     const rqt_vertex a = rqt_vertex_clamp(&s->lattice, p->t.apex);
     rqt_vertex l = rqt_vertex_clamp(&s->lattice, p->t.left), r = rqt_vertex_clamp(&s->lattice, p->t.right);
     int64_t dl = (int64_t)p->left - p->apex, dr = (int64_t)p->right - p->apex;

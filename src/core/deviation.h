@@ -7,12 +7,13 @@
 
 enum { HAS_VALID = 1, HAS_VOID = 2 }; /* what samples a closed triangle holds */
 
-/* A terrain, and those of its rows that are at hand. */
+/* A terrain, and those of its samples that are at hand: whole rows, or a window. */
 typedef struct deviation_field {
     rqt_lattice lattice;
     int32_t width, height;
-    int32_t first_row;    /* of the terrain, the first row of q and valid */
-    const int32_t *q;     /* rows of `width` values */
+    int32_t first_row, first_column; /* of the terrain, the first sample of q and valid */
+    size_t stride;                   /* from row to row of q and valid; the width where rows are whole */
+    const int32_t *q;
     const uint8_t *valid; /* NULL: all */
     code_scale scale;
     rqt_void_cost cost;
@@ -38,10 +39,10 @@ typedef struct triangle_part {
 } triangle_part;
 
 static inline size_t sample_index(const deviation_field *s, int32_t x, int32_t y) {
-    return (size_t)(y - s->first_row) * (size_t)s->width + (size_t)x;
+    return (size_t)(y - s->first_row) * s->stride + (size_t)(x - s->first_column);
 }
 
-/* The sample of a lattice vertex, clamped, of the rows at hand. */
+/* The sample of a lattice vertex, clamped, of those at hand. */
 static inline size_t clamped_index(const deviation_field *s, int32_t x, int32_t y) {
     return sample_index(s, x < s->width ? x : s->width - 1, y < s->height ? y : s->height - 1);
 }
@@ -57,6 +58,16 @@ static inline bool valid_at(const deviation_field *s, int32_t x, int32_t y) {
 static inline int state_at(const deviation_field *s, int32_t x, int32_t y) {
     return valid_at(s, x, y) ? HAS_VALID : HAS_VOID;
 }
+
+/* A clamped triangle: any triangle of samples, counter-clockwise or made so; its plane without division. */
+typedef struct sample_triangle {
+    rqt_vertex corner[4]; /* the first one again at the end */
+    int64_t area;         /* twice */
+    __int128 gx, gy;      /* gradients times `area` */
+    int32_t base;         /* height of the first corner */
+    bool in_doubles;      /* its plane is exact in doubles: every term and sum is below 2^53 */
+} sample_triangle;
+sample_triangle sample_triangle_of(const deviation_field *s, const plane_triangle *p);
 
 /* Does the clamped triangle have an area? Those that have none cost nothing and are never mixed. */
 bool triangle_has_area(const deviation_field *s, const rqt_triangle *t);

@@ -136,6 +136,7 @@ rqt_status errors_compute(const rqt_grid *grid, const rqt_unit *unit, const rqt_
     deviation_field field = {.lattice = grid->lattice,
                              .width = grid->lattice.width,
                              .height = grid->lattice.height,
+                             .stride = (size_t)grid->lattice.width,
                              .q = grid->q,
                              .valid = grid->valid,
                              .cost = *cost,

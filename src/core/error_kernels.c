@@ -47,8 +47,12 @@ static inline __attribute__((always_inline)) bool any_plain(lanes_u a) {
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(RQT_SCALAR)
 #include <immintrin.h>
 #define HAVE_AVX2_KERNELS 1
+#ifdef __clang__ /* builds the fuzzers */
+#pragma clang attribute push(__attribute__((target("avx2"))), apply_to = function)
+#else
 #pragma GCC push_options
 #pragma GCC target("avx2")
+#endif
 #define NAME(x) x##_avx2
 #define LANES_ABS(a) ((lanes_u)_mm256_abs_epi32((__m256i)(a)))
 #define LANES_MAX(a, b) ((lanes_u)_mm256_max_epi32((__m256i)(a), (__m256i)(b)))
@@ -59,7 +63,11 @@ static inline __attribute__((always_inline)) bool any_plain(lanes_u a) {
 #include "error_kernels_rows.h"
 
 #include "error_kernels_cells.h"
+#ifdef __clang__
+#pragma clang attribute pop
+#else
 #pragma GCC pop_options
+#endif
 #endif
 
 const error_kernels *error_kernels_plain(void) {

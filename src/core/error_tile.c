@@ -59,7 +59,7 @@ static void raise_error(error_tile *tile, rqt_vertex v, rqt_code code, bool mixe
     const size_t at = (size_t)(v.y - tile->y) * tile->stride + (size_t)(v.x - tile->x);
     if (code > tile->code[at]) tile->code[at] = code;
     if (mixed) {
-        tile->outline[at] = 1;
+        tile->outline[at] = 1; /* there are voids. NOLINT(clang-analyzer-core.NullDereference) */
         tile->any_outline = true;
     }
 }

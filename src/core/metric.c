@@ -269,6 +269,7 @@ rqt_status rqt_metric_compute(const rqt_grid *grid, const rqt_unit *unit, const 
     solver s = {.field = {.lattice = grid->lattice,
                           .width = grid->lattice.width,
                           .height = grid->lattice.height,
+                          .stride = (size_t)grid->lattice.width,
                           .q = grid->q,
                           .valid = grid->valid,
                           .cost = *cost,

@@ -438,6 +438,50 @@ void rqt_build_summary(const rqt_build *build, const rqt_sweep *sweep, rqt_block
 /* The largest finite error of the terrain, when all is built. */
 rqt_code rqt_build_max_error(const rqt_build *build);
 
+/* -------------------------------------------------------------------------------------------- update --
+ * New samples for a rectangle of a terrain whose blocks are kept somewhere: which blocks and summaries become
+ * others, and what they become. That is what a build over the changed raster gives, bit for bit. What it takes
+ * grows with the rectangle, and for coarser vertices near it with what a branch and bound over summaries has to
+ * look at; not with the terrain. */
+typedef struct rqt_statistics {
+    int64_t voids;
+    int32_t min_q, max_q; /* of the valid samples; both 0 when there are none */
+    rqt_code max_error;   /* rqt_build_max_error */
+} rqt_statistics;
+
+typedef struct rqt_update {
+    rqt_lattice lattice;
+    int k;
+    rqt_unit unit;
+    rqt_void_cost cost;
+    rqt_statistics before;
+    int32_t x, y, width, height; /* the rectangle, inside the raster */
+    const int32_t *q;            /* width * height, |q| < RQT_HEIGHT_LIMIT; anything where void */
+    const uint8_t *valid;        /* 0 or 1; NULL: all */
+    /* The blocks as they are: decoded with their corners (rqt_block_set_corners), valid until the next call. NULL
+     * and false: the update stops with RQT_READ_FAILED. Only blocks that exist are asked for, and none after it has
+     * been written. */
+    const rqt_block *(*read_block)(void *context, rqt_block_number number);
+    bool (*read_summary)(void *context, rqt_block_number number, rqt_summary *summary);
+    /* A block that changes, each once, in ascending order of number within a level, when everything is known. block
+     * NULL: its bytes stay as they are. before and after may be equal. false stops with RQT_READ_FAILED. */
+    bool (*write)(void *context, rqt_block_number number, const rqt_summary *before, const rqt_summary *after,
+                  const rqt_block *block);
+    bool (*is_interrupted)(void *context); /* may be NULL */
+    void *context;
+} rqt_update;
+
+typedef struct rqt_update_result {
+    rqt_statistics after;
+    int64_t changed;  /* samples of the rectangle that are others now; 0: nothing has been written */
+    int64_t measured; /* samples that triangles were measured by, each time */
+    int64_t cells;    /* summaries that the branch and bound has looked at */
+} rqt_update_result;
+
+/* RQT_INVALID when the rectangle is not in the raster, or a height not within the limit. RQT_CORRUPT when what is
+ * read cannot be. Memory: about 15 bytes a sample of the rectangle, and the blocks that change, decoded. */
+rqt_status rqt_update_run(const rqt_update *update, const rqt_allocator *allocator, rqt_update_result *result);
+
 /* ------------------------------------------------------------------------------------------- regions --
  * A geometry as it came (WKT or EWKT text, GeoPackage or SpatiaLite bytes), in its own coordinates; and a
  * region: the same in sample coordinates, each rounded to the nearest 2^-20 sample, exact integers after that.
@@ -797,6 +841,7 @@ rqt_status rqt_mesh_decode(const uint8_t *bytes, size_t size, rqt_mesh_header *h
 
 typedef struct rqt_wire_header {
     bool is_delta;
+    bool has_normals; /* rqt_wire_normals has something to give; never for an increment */
     rqt_lattice lattice;
     int k;                                 /* block size of the terrain: the order of the walk depends on it */
     uint64_t vertex_count, triangle_count; /* of the mesh; of an increment: of the mesh that it ends in */
@@ -830,6 +875,22 @@ rqt_status rqt_wire_decode(const uint8_t *bytes, size_t size, bool wants_leaves,
 rqt_status rqt_wire_apply(const rqt_wire_header *state_header, const rqt_patch *state, const uint8_t *bytes,
                           size_t size, const rqt_allocator *allocator, rqt_wire_header *header, rqt_patch *patch,
                           rqt_message *message);
+/* Normals beside a mesh: unit vectors of the terrain at its vertices, x east, y north, z up, z > 0 but for
+ * rounding; two bytes each. _pack: to the nearest of its 255 x 255 directions, 0.56 degrees off at worst, straight
+ * up exactly; _unpack: a unit vector. */
+void rqt_normal_pack(const float normal[3], int8_t packed[2]);
+void rqt_normal_unpack(const int8_t packed[2], float normal[3]);
+/* Appends them, 3 floats a vertex in the patch's order, to what rqt_wire_encode wrote; bytes has room for
+ * rqt_wire_normals_bound more. RQT_INVALID for an increment, another number of vertices, or a mesh that has some.
+ */
+size_t rqt_wire_normals_bound(size_t vertex_count);
+rqt_status rqt_wire_add_normals(const float *normals, size_t vertex_count, const rqt_allocator *allocator,
+                                uint8_t *bytes, size_t *size);
+/* The normals of a mesh that rqt_wire_decode has read, which has vertex_count vertices; normals has room for three
+ * floats each. Trusts nothing, as rqt_wire_decode; RQT_INVALID when they are none, or of another number of
+ * vertices. */
+rqt_status rqt_wire_normals(const uint8_t *bytes, size_t size, size_t vertex_count, const rqt_allocator *allocator,
+                            float *normals, rqt_message *message);
 /* What an increment knows a mesh by: its vertices, their levels and heights, and its leaves, in their order. */
 uint64_t rqt_wire_digest(const rqt_patch *patch);
 

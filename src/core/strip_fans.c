@@ -29,17 +29,12 @@ static int find_join(const strip *s, uint32_t first, uint32_t second, bool odd, 
     const bool has_one = s->count > 0, has_two = s->count > 1;
     uint32_t before = has_two ? s->index[s->count - 2] : 0, last = has_one ? s->index[s->count - 1] : 0;
     bool pair = has_two; /* before and last are both there */
-    bool begun = has_one && last == first;
-    if (has_one && !begun) {
-        if (pair && !is_join(before, last, first)) {
-            out[n++] = last;
-            before = last;
-        }
+    if (has_one && last != first) {
+        if (pair && !is_join(before, last, first)) out[n++] = last;
         out[n++] = first;
         before = last;
         last = first;
         pair = true;
-        begun = true;
     } else if (!has_one) {
         out[n++] = first;
         last = first;

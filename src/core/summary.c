@@ -26,7 +26,8 @@ static bool get_vertex(const uint8_t *p, rqt_summary_vertex *v) {
     v->q = (int32_t)get32(p);
     v->error = get16(p + 4);
     v->flags = p[6];
-    return v->q > -RQT_HEIGHT_LIMIT && v->q < RQT_HEIGHT_LIMIT && v->flags <= KNOWN_FLAGS && p[7] == 0;
+    return v->q > -RQT_HEIGHT_LIMIT && v->q < RQT_HEIGHT_LIMIT && v->flags <= KNOWN_FLAGS && p[7] == 0 &&
+           (v->flags & RQT_VALID || v->q == 0);
 }
 
 void rqt_summary_encode(const rqt_summary *summary, uint8_t bytes[RQT_SUMMARY_BYTES]) {

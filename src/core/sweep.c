@@ -138,6 +138,7 @@ rqt_status sweep_create(const rqt_sweep_plan *plan, const error_kernels *kernels
     s->field = (deviation_field){.lattice = plan->lattice,
                                  .width = plan->lattice.width,
                                  .height = plan->lattice.height,
+                                 .stride = (size_t)plan->lattice.width,
                                  .cost = plan->cost,
                                  .relief = plan->max_q > plan->min_q ? (int64_t)plan->max_q - plan->min_q : 0,
                                  .kernels = kernels};

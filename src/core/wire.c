@@ -8,7 +8,7 @@ enum {
     AT_VERSION = 4,
     AT_KIND = 5,
     AT_K = 6,
-    AT_ZERO = 7,
+    AT_FLAGS = 7,
     AT_CHECKSUM = 8,
     AT_VERTEX_COUNT = 16,
     AT_TRIANGLE_COUNT = 24,
@@ -20,6 +20,7 @@ enum {
 
     KIND_MESH = 1,
     KIND_DELTA = 2,
+    FLAG_NORMALS = 1,
 
     ZSTD_BLOCK = 1 << 17, /* what the least zstd block, of 4 bytes, can stand for */
     LEAST_ZSTD_BLOCK = 4
@@ -57,9 +58,28 @@ uint64_t wire_payload_of(const uint8_t *bytes) {
     return get64(bytes + AT_PAYLOAD);
 }
 
+void wire_mark_normals(uint8_t *bytes, size_t size) {
+    bytes[AT_FLAGS] |= FLAG_NORMALS;
+    put64(bytes + AT_CHECKSUM, checksum64(bytes, size, AT_CHECKSUM));
+}
+
+/* The size of the frame at the beginning of room bytes, which stands for `content` bytes; 0 when there is none, or
+ * one that claims more than zstd can stand for. */
+static size_t frame_size(const uint8_t *frame, size_t room, uint64_t content) {
+    if (room < 4 || get32(frame) != ZSTD_MAGICNUMBER) return 0;
+    const size_t size = ZSTD_findFrameCompressedSize(frame, room);
+    if (ZSTD_isError(size) || ZSTD_getFrameContentSize(frame, size) != content) return 0;
+    return content / ZSTD_BLOCK > size / LEAST_ZSTD_BLOCK ? 0 : size;
+}
+
+size_t wire_mesh_frame(const uint8_t *bytes, size_t size) {
+    return frame_size(bytes + RQT_WIRE_HEADER_BYTES, size - RQT_WIRE_HEADER_BYTES, wire_payload_of(bytes));
+}
+
 static void get_header(const uint8_t *bytes, rqt_wire_header *h) {
     const mesh_frame frame = mesh_frame_get(bytes);
     *h = (rqt_wire_header){.is_delta = bytes[AT_KIND] == KIND_DELTA,
+                           .has_normals = bytes[AT_FLAGS] == FLAG_NORMALS,
                            .k = bytes[AT_K],
                            .vertex_count = get64(bytes + AT_VERTEX_COUNT),
                            .triangle_count = get64(bytes + AT_TRIANGLE_COUNT),
@@ -77,8 +97,10 @@ rqt_status rqt_wire_info(const uint8_t *bytes, size_t size, rqt_wire_header *hea
     if (memcmp(bytes, "RQTW", 4) != 0)
         return corrupt(message, "not a mesh in wire format: it does not begin with RQTW");
     if (bytes[AT_VERSION] != RQT_FORMAT_VERSION) return corrupt(message, "a mesh of unknown format version");
-    if ((bytes[AT_KIND] != KIND_MESH && bytes[AT_KIND] != KIND_DELTA) || bytes[AT_ZERO] != 0)
+    if (bytes[AT_KIND] != KIND_MESH && bytes[AT_KIND] != KIND_DELTA)
         return corrupt(message, "the mesh is neither whole nor an increment");
+    if (bytes[AT_FLAGS] > FLAG_NORMALS || (bytes[AT_FLAGS] && bytes[AT_KIND] != KIND_MESH))
+        return corrupt(message, "the mesh has parts that this version does not know");
     if (get64(bytes + AT_CHECKSUM) != checksum64(bytes, size, AT_CHECKSUM))
         return corrupt(message, "the mesh's checksum is wrong: its bytes have changed");
     rqt_wire_header h;
@@ -90,14 +112,13 @@ rqt_status rqt_wire_info(const uint8_t *bytes, size_t size, rqt_wire_header *hea
     if (!rqt_unit_is_valid(&h.unit)) return corrupt(message, "the mesh's unit of height is not one");
     if (!(h.eps >= 0) || !(h.eps_from >= 0) || (h.is_delta ? h.eps_from < h.eps : h.eps_from != 0 || h.from != 0))
         return corrupt(message, "the mesh's eps is not one");
-    const uint8_t *frame = bytes + RQT_WIRE_HEADER_BYTES;
-    const size_t room = size - RQT_WIRE_HEADER_BYTES;
-    const uint64_t payload = wire_payload_of(bytes);
-    if (room < 4 || get32(frame) != ZSTD_MAGICNUMBER || ZSTD_findFrameCompressedSize(frame, room) != room ||
-        ZSTD_getFrameContentSize(frame, room) != payload || payload / ZSTD_BLOCK > room / LEAST_ZSTD_BLOCK)
-        return corrupt(message, "the mesh's compressed bytes are cut off, or not what follows its header");
     if (h.vertex_count >= WIRE_MOST || h.triangle_count >= WIRE_MOST)
         return corrupt(message, "the mesh has more vertices or triangles than indices reach");
+    const uint8_t *frame = bytes + RQT_WIRE_HEADER_BYTES;
+    const size_t room = size - RQT_WIRE_HEADER_BYTES, mesh = wire_mesh_frame(bytes, size), rest = room - mesh;
+    const size_t normals = h.has_normals && mesh > 0 ? frame_size(frame + mesh, rest, 2 * h.vertex_count) : 0;
+    if (mesh == 0 || rest != normals || (h.has_normals && normals == 0))
+        return corrupt(message, "the mesh's compressed bytes are cut off, or not what follows its header");
     *header = h;
     sentence_begin(message, "");
     return RQT_OK;

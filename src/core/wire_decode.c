@@ -190,18 +190,11 @@ static bool open_streams(wire_walk *w, const uint8_t *payload, size_t size) {
     return true;
 }
 
-static void *zstd_take(void *opaque, size_t bytes) {
-    return memory_take(opaque, bytes);
-}
-static void zstd_drop(void *opaque, void *p) {
-    memory_drop(opaque, p);
-}
-
 /* The decompressed payload with its slack of zeros. */
 static rqt_status inflate(const uint8_t *frame, size_t room, size_t payload, size_t slack,
                           const rqt_allocator *allocator, uint8_t **out) {
     rqt_allocator copy = *allocator;
-    const ZSTD_customMem memory = {zstd_take, zstd_drop, &copy};
+    const ZSTD_customMem memory = {wire_take, wire_drop, &copy};
     *out = memory_take(allocator, payload + slack);
     ZSTD_DCtx *z = *out ? ZSTD_createDCtx_advanced(memory) : NULL;
     if (!z) return RQT_NO_MEMORY;
@@ -237,7 +230,7 @@ static rqt_status run(decoder *d, const rqt_wire_header *h, const uint8_t *bytes
     const size_t known = state ? 3 * state->triangle_count : 0;
     if (h->vertex_count > payload + known || h->triangle_count > 2 * h->vertex_count)
         return corrupt(message, "the mesh claims more vertices or triangles than its bytes can hold");
-    rqt_status status = inflate(bytes + RQT_WIRE_HEADER_BYTES, size - RQT_WIRE_HEADER_BYTES, payload,
+    rqt_status status = inflate(bytes + RQT_WIRE_HEADER_BYTES, wire_mesh_frame(bytes, size), payload,
                                 wire_slack(h->k), &w->allocator, &plain);
     if (status == RQT_CORRUPT) (void)corrupt(message, "the mesh's compressed bytes do not decompress");
     if (status == RQT_OK && !open_streams(w, plain, payload))

@@ -293,17 +293,10 @@ static size_t put_directory(const wire_walk *w, uint8_t *bytes) {
     return at;
 }
 
-static void *zstd_take(void *opaque, size_t bytes) {
-    return memory_take(opaque, bytes);
-}
-static void zstd_drop(void *opaque, void *p) {
-    memory_drop(opaque, p);
-}
-
 /* Directory and streams as one frame; 0: no memory. A stream that is worth it begins a zstd block of its own. */
 static size_t deflate(const wire_walk *w, uint8_t *bytes, size_t room, size_t *payload) {
     rqt_allocator copy = w->allocator;
-    const ZSTD_customMem memory = {zstd_take, zstd_drop, &copy};
+    const ZSTD_customMem memory = {wire_take, wire_drop, &copy};
     uint8_t directory[WIRE_DIRECTORY];
     const size_t listed = put_directory(w, directory);
     *payload = listed;

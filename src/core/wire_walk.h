@@ -186,10 +186,21 @@ static inline uint32_t wire_zigzag(int32_t r) {
     return (uint32_t)r << 1 ^ (uint32_t)(r >> 31);
 }
 
+/* zstd's memory is the allocator's. */
+static inline void *wire_take(void *opaque, size_t bytes) {
+    return memory_take(opaque, bytes);
+}
+static inline void wire_drop(void *opaque, void *p) {
+    memory_drop(opaque, p);
+}
+
 /* wire.c: the payload's directory, header and frame */
 enum { WIRE_DIRECTORY = 2 + 5 * (WIRE_STREAMS - 1) }; /* bytes at most */
 size_t wire_slack(int k);                             /* readable bytes that must follow a payload */
 void wire_put_header(const rqt_wire_header *header, uint64_t payload, uint8_t *bytes);
 uint64_t wire_payload_of(const uint8_t *bytes);
+/* The zstd frame of the mesh: its size; 0 when it is none. Behind it come the normals, if any. */
+size_t wire_mesh_frame(const uint8_t *bytes, size_t size);
+void wire_mark_normals(uint8_t *bytes, size_t size); /* in the header: they are there now */
 
 #endif

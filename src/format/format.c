@@ -33,6 +33,7 @@ bool format_from_name(const char *name, format_kind *kind) {
 }
 
 void format_coordinates(const format_frame *frame, const rqt_patch_vertex *vertex, double xyz[3]) {
+    /* Vertices are set. NOLINTNEXTLINE(clang-analyzer-core.UndefinedBinaryOperatorResult) */
     xyz[0] = frame->placement.x0 + vertex->col * frame->placement.dx;
     xyz[1] = frame->placement.y0 + vertex->row * frame->placement.dy;
     xyz[2] = rqt_unit_metres(&frame->unit, vertex->q);
@@ -117,14 +118,21 @@ static bool add_obj(sink *s, const format_mesh *mesh) {
     return true;
 }
 
-enum { PLY_VERTEX = 24, PLY_FACE = 1 + 12 };
+enum { PLY_VERTEX = 24, PLY_NORMAL = 12, PLY_FACE = 1 + 12 };
 
 static void add_ply_header(sink *s, const format_mesh *mesh) {
     add_text(s, "ply\nformat binary_little_endian 1.0\n");
     add_comments(s, mesh, "comment ");
+    if (mesh->srid > 0) { /* as QGIS (MDAL) reads it */
+        add_text(s, "comment crs: EPSG:");
+        add_count(s, (uint64_t)mesh->srid);
+        add_text(s, "\n");
+    }
     add_text(s, "element vertex ");
     add_count(s, mesh->vertex_count);
-    add_text(s, "\nproperty double x\nproperty double y\nproperty double z\nelement face ");
+    add_text(s, "\nproperty double x\nproperty double y\nproperty double z\n");
+    if (mesh->normals) add_text(s, "property float nx\nproperty float ny\nproperty float nz\n");
+    add_text(s, "element face ");
     add_count(s, mesh->triangle_count);
     add_text(s, "\nproperty list uchar int vertex_indices\nend_header\n");
 }
@@ -134,6 +142,7 @@ static bool write_ply_body(const format_mesh *mesh, uint8_t *p) {
         double xyz[3];
         if (!mesh_coordinates(mesh, i, xyz)) return false;
         for (int axis = 0; axis < 3; axis++) p = put_double(p, xyz[axis]);
+        for (size_t axis = 0; mesh->normals && axis < 3; axis++) p = put_float(p, mesh->normals[3 * i + axis]);
     }
     for (size_t t = 0; t < mesh->triangle_count; t++) {
         p = put_byte(p, 3);
@@ -149,7 +158,8 @@ static uint64_t size_from_counts(const format_mesh *mesh, format_kind kind) {
     if (kind != FORMAT_PLY) return geometry_size(kind, mesh->triangle_count);
     sink s = {NULL, 0};
     add_ply_header(&s, mesh);
-    return s.size + PLY_VERTEX * (uint64_t)mesh->vertex_count + PLY_FACE * (uint64_t)mesh->triangle_count;
+    const uint64_t vertex = mesh->normals ? PLY_VERTEX + PLY_NORMAL : PLY_VERTEX;
+    return s.size + vertex * (uint64_t)mesh->vertex_count + PLY_FACE * (uint64_t)mesh->triangle_count;
 }
 
 static bool indices_are_sound(const format_mesh *mesh) {
@@ -218,6 +228,7 @@ rqt_status format_patch(const rqt_patch *patch, const format_frame *frame, forma
                               .context = &source,
                               .srid = frame->srid,
                               .title = frame->title,
-                              .eps = frame->eps};
+                              .eps = frame->eps,
+                              .normals = frame->normals};
     return format_write(&mesh, kind, allocator, bytes, size);
 }

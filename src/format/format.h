@@ -21,6 +21,7 @@ typedef struct format_frame {
     int32_t srid;      /* 0: none */
     const char *title; /* terrain's name, for the formats that carry comments */
     double eps;
+    const float *normals; /* as in format_mesh */
 } format_frame;
 
 /* x,y,z of a vertex: the one expression of the contract, in double, not fused. */
@@ -38,27 +39,30 @@ typedef struct format_mesh {
     /* x,y,z of vertex 0 .. vertex_count-1: the same each time it is asked, and it is asked more than once. */
     void (*coordinates)(const void *context, size_t vertex, double xyz[3]);
     const void *context;
-    int32_t srid;      /* of x and y; 0: none */
-    const char *title; /* NULL, or the terrain's name, for the formats that carry comments */
+    const float *normals; /* NULL, or three a vertex: properties nx ny nz of a ply */
+    int32_t srid;         /* of x and y; 0: none */
+    const char *title;    /* NULL, or the terrain's name, for the formats that carry comments */
     double eps;
 } format_mesh;
 
 /* obj: text, "v x y z" with the shortest digits and "f a b c" (1-based). ply: binary little-endian, double x,y,z,
- * int list of three. wkb: ISO MULTIPOLYGON Z (type 1006), every triangle a closed ring of 4 points; gpkg: the same
- * behind a GeoPackage header with an xy envelope (empty flag when empty); spatialite: the same geometry as a
- * SpatiaLite BLOB. An empty mesh gives a valid empty file. *bytes is released with allocator->resize(context,
- * bytes, 0). RQT_INVALID when the result would exceed 2^31-1 bytes (what SQLite can return), for an index that is
- * no vertex's, and for a coordinate that is not finite (one that is written). */
+ * float nx,ny,nz where there are normals, int list of three. wkb: ISO MULTIPOLYGON Z (type 1006), every triangle a
+ * closed ring of 4 points; gpkg: the same behind a GeoPackage header with an xy envelope (empty flag when empty);
+ * spatialite: the same geometry as a SpatiaLite BLOB. An empty mesh gives a valid empty file. *bytes is released
+ * with allocator->resize(context, bytes, 0). RQT_INVALID when the result would exceed 2^31-1 bytes (what SQLite can
+ * return), for an index that is no vertex's, and for a coordinate that is not finite (one that is written). */
 rqt_status format_write(const format_mesh *mesh, format_kind kind, const rqt_allocator *allocator, uint8_t **bytes,
                         size_t *size);
 /* The same for a patch. */
 rqt_status format_patch(const rqt_patch *patch, const format_frame *frame, format_kind kind,
                         const rqt_allocator *allocator, uint8_t **bytes, size_t *size);
 
-/* A closed triangle as a GeoPackage POLYGON Z, for layers with a row per triangle: writes 8 + 32 + 93 + ... bytes;
- * returns the size, at most FORMAT_TRIANGLE_BYTES. */
+/* A triangle as a GeoPackage POLYGON Z, with an xy envelope, and a point as a GeoPackage POINT Z: for rows with a
+ * geometry each. They return the size, at most FORMAT_TRIANGLE_BYTES and FORMAT_POINT_BYTES. */
 #define FORMAT_TRIANGLE_BYTES 160
+#define FORMAT_POINT_BYTES 40
 size_t format_triangle_gpkg(const double xyz[3][3], int32_t srid, uint8_t bytes[FORMAT_TRIANGLE_BYTES]);
+size_t format_point_gpkg(const double xyz[3], int32_t srid, uint8_t bytes[FORMAT_POINT_BYTES]);
 
 /* Polygons as a GeoPackage geometry with an xy envelope, a POLYGON or a MULTIPOLYGON: rings one after the other in
  * xy (two doubles a point, not closed), one with ring_is_shell begins a polygon. What rqt_corridor returns. */

@@ -1,9 +1,9 @@
 /* geometry.c - triangles and rings as WKB, as GeoPackage geometries and as SpatiaLite BLOBs. All little-endian.
  *
  *   wkb         01, u32 1006 (ISO MULTIPOLYGON Z), u32 count, and for each triangle a POLYGON Z:
- *               01, u32 1003, u32 1 ring, u32 4 points, 4 times x,y,z
+ *               01, u32 1003, u32 1 ring, u32 4 points, 4 times x,y,z; a POINT Z: 01, u32 1001, x,y,z
  *   gpkg        'GP', version 0, flags, i32 srs_id, [min x, max x, min y, max y], then the same WKB. Flags: 1
- *               little-endian, 2 envelope of x and y, 0x10 empty, which has no envelope
+ *               little-endian, 2 envelope of x and y, 0x10 empty, which has no envelope; nor has a point
  *   spatialite  00 01, i32 srid, min x, min y, max x, max y, 7C, u32 1006, u32 count, and for each triangle an
  * entity: 69, u32 1003, u32 1 ring, u32 4 points, 4 times x,y,z; at the end FE
  *
@@ -23,7 +23,7 @@
 
 #include <math.h>
 
-enum { POLYGON = 3, MULTIPOLYGON = 6, POLYGON_Z = 1003, MULTIPOLYGON_Z = 1006 };
+enum { POLYGON = 3, MULTIPOLYGON = 6, POINT_Z = 1001, POLYGON_Z = 1003, MULTIPOLYGON_Z = 1006 };
 enum {
     WKB_HEAD = 9,       /* byte order, type, count */
     TRIANGLE = 13 + 96, /* head, ring count, point count; four points */
@@ -53,14 +53,16 @@ static uint8_t *put_triangle(uint8_t *p, unsigned mark, const double xyz[3][3]) 
     return p;
 }
 
-/* box NULL: empty. */
-static uint8_t *put_gpkg_head(uint8_t *p, int32_t srid, const format_box *box) {
+enum { GPKG_PLAIN = 0x01, GPKG_BOXED = 0x03, GPKG_EMPTY = 0x11 };
+
+/* box: with GPKG_BOXED only. */
+static uint8_t *put_gpkg_head(uint8_t *p, unsigned flags, int32_t srid, const format_box *box) {
     p = put_byte(p, 'G');
     p = put_byte(p, 'P');
     p = put_byte(p, 0);
-    p = put_byte(p, box ? 0x03 : 0x11);
+    p = put_byte(p, flags);
     p = put_u32(p, (uint32_t)(srid ? srid : -1));
-    if (!box) return p;
+    if (flags != GPKG_BOXED) return p;
     p = put_double(p, box->min_x);
     p = put_double(p, box->max_x);
     p = put_double(p, box->min_y);
@@ -120,7 +122,7 @@ bool geometry_write(format_kind kind, const format_mesh *mesh, uint8_t *bytes) {
     if (spatialite)
         p = put_spatialite_head(p, mesh->srid, count ? &box : NULL);
     else {
-        if (kind == FORMAT_GPKG) p = put_gpkg_head(p, mesh->srid, count ? &box : NULL);
+        if (kind == FORMAT_GPKG) p = put_gpkg_head(p, count ? GPKG_BOXED : GPKG_EMPTY, mesh->srid, &box);
         p = put_byte(p, 1);
     }
     p = put_u32(p, MULTIPOLYGON_Z);
@@ -132,7 +134,14 @@ size_t format_triangle_gpkg(const double xyz[3][3], int32_t srid, uint8_t bytes[
     format_box box;
     box_begin(&box, xyz[0][0], xyz[0][1]);
     for (int i = 1; i < 3; i++) box_add(&box, xyz[i][0], xyz[i][1]);
-    return (size_t)(put_triangle(put_gpkg_head(bytes, srid, &box), 1, xyz) - bytes);
+    return (size_t)(put_triangle(put_gpkg_head(bytes, GPKG_BOXED, srid, &box), 1, xyz) - bytes);
+}
+
+size_t format_point_gpkg(const double xyz[3], int32_t srid, uint8_t bytes[FORMAT_POINT_BYTES]) {
+    uint8_t *p = put_gpkg_head(bytes, GPKG_PLAIN, srid, NULL);
+    p = put_byte(p, 1);
+    p = put_u32(p, POINT_Z);
+    return (size_t)(put_xyz(p, xyz) - bytes);
 }
 
 rqt_status format_polygons_gpkg(const double *xy, const size_t *ring_points, const unsigned char *ring_is_shell,
@@ -164,7 +173,7 @@ rqt_status format_polygons_gpkg(const double *xy, const size_t *ring_points, con
     if (!p) return RQT_NO_MEMORY;
     *bytes = p;
     *size = (size_t)total;
-    p = put_gpkg_head(p, srid, &box);
+    p = put_gpkg_head(p, GPKG_BOXED, srid, &box);
     if (polygons > 1) {
         p = put_byte(p, 1);
         p = put_u32(p, MULTIPOLYGON);

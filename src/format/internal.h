@@ -24,6 +24,11 @@ static inline uint8_t *put_u32(uint8_t *p, uint32_t v) {
     for (int i = 0; i < 4; i++) p[i] = (uint8_t)(v >> 8 * i);
     return p + 4;
 }
+static inline uint8_t *put_float(uint8_t *p, float v) {
+    uint32_t bits;
+    memcpy(&bits, &v, 4);
+    return put_u32(p, bits);
+}
 static inline uint8_t *put_double(uint8_t *p, double v) {
     uint64_t bits;
     memcpy(&bits, &v, 8);

@@ -90,7 +90,7 @@ static void take_digits(const char *text, decimal *out) {
     out->n = 0;
     for (; *text && *text != 'e'; text++)
         if (*text >= '0' && *text <= '9' && out->n < MOST) out->digits[out->n++] = *text;
-    out->exponent = *text ? atoi(text + 1) : 0;
+    out->exponent = *text ? (int)strtol(text + 1, NULL, 10) : 0;
 }
 
 /* Any finite v > 0, by the C library. A subnormal can need a single digit: start there. */
@@ -116,7 +116,7 @@ static int lay_out(const decimal *d, char *text) {
     char *p = text;
     int n = d->n, exponent = d->exponent;
     if (exponent < -4 || exponent >= (n > FEWEST ? n : FEWEST)) {
-        *p++ = d->digits[0];
+        *p++ = d->digits[0]; /* n >= 1. NOLINT(clang-analyzer-core.uninitialized.Assign) */
         if (n > 1) *p++ = '.';
         for (int i = 1; i < n; i++) *p++ = d->digits[i];
         *p++ = 'e';

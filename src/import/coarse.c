@@ -59,12 +59,15 @@ void import_coarse_keep(import_coarse *c, const import_strip *strip) {
 }
 
 bool import_coarse_give(const import_job *job, const import_coarse *c, const import_steps *steps, bool has_voids,
-                        rqt_sweep *sweep) {
+                        import_fill *fill, rqt_sweep *sweep) {
     const size_t width = (size_t)c->width, columns = (size_t)c->columns;
     int32_t *q = calloc(width, sizeof *q), *heights = malloc(columns * sizeof *heights);
     uint8_t *valid = calloc(width, 1);
     double *values = malloc(columns * sizeof *values);
-    const bool ok = q && heights && valid && values;
+    import_fill_reader *filled = NULL;
+    const bool there = q && heights && valid && values;
+    bool ok = there || import_no_memory(job, "keeping the coarse samples");
+    if (ok && fill) ok = import_fill_reader_create(job, fill, &filled);
     for (int32_t row = 0; ok && row < c->rows; row++) {
         const int32_t y = place(row, c->height, c->b);
         if (!rqt_sweep_wants(sweep, y)) continue;
@@ -75,11 +78,13 @@ bool import_coarse_give(const import_job *job, const import_coarse *c, const imp
             q[x] = heights[i];
             valid[x] = c->kept.valid[at + (size_t)i];
         }
+        if (fill) ok = import_fill_apply(job, filled, y, q, valid);
         rqt_sweep_first(sweep, y, q, has_voids ? valid : NULL);
     }
+    import_fill_reader_free(filled);
     free(q);
     free(heights);
     free(valid);
     free(values);
-    return ok || import_no_memory(job, "keeping the coarse samples");
+    return ok;
 }

@@ -13,7 +13,8 @@
 bool import_crs_is_same(OGRSpatialReferenceH a, OGRSpatialReferenceH b) {
     static const char *const how[] = {"IGNORE_DATA_AXIS_TO_SRS_AXIS_MAPPING=YES",
                                       "CRITERION=EQUIVALENT_EXCEPT_AXIS_ORDER_GEOGCRS", NULL};
-    if (!a || !b) return !a && !b;
+    if (a == b) return true;
+    if (!a || !b) return false;
     return OSRIsSameEx(a, b, how) != 0;
 }
 

@@ -156,6 +156,14 @@ bool import_database_begin(const import_job *job, int k, int64_t page_cache, imp
     return code == SQLITE_OK || import_database_refuse(job, code, detail);
 }
 
+bool import_database_change(const import_job *job, import_database *d) {
+    struct stat file;
+    *d = (import_database){0};
+    if (stat(job->database, &file)) return import_refuse(job, "%s: %s", job->database, strerror(errno));
+    if (S_ISDIR(file.st_mode)) return import_refuse(job, "%s is a folder and not a database", job->database);
+    return open_file(job, d, false) && run(job, d, "SELECT count(*) FROM sqlite_master; BEGIN IMMEDIATE");
+}
+
 bool import_database_commit(const import_job *job, import_database *d) {
     if (!run(job, d, "COMMIT")) return false;
     d->created = false;
@@ -174,9 +182,9 @@ void import_database_close(const import_job *job, import_database *d) {
     if (d->created) {
         static const char *const parts[] = {"", "-journal", "-wal", "-shm"};
         for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
-            char *name = sqlite3_mprintf("%s%s", job->database, parts[i]);
-            if (name) unlink(name);
-            sqlite3_free(name);
+            char name[4096 + 16]; /* no longer than what could be created; memory may be what is missing */
+            const int n = snprintf(name, sizeof name, "%s%s", job->database, parts[i]);
+            if (n > 0 && (size_t)n < sizeof name) unlink(name);
         }
     }
     *d = (import_database){0};

@@ -1,4 +1,4 @@
-/* import.c - the whole: options, sources, plan, probe, a first reading, errors and blocks, the database.
+/* import.c - the whole: options, sources, plan, probe, a first reading, voids, errors and blocks, the database.
  *
  * The order is chosen by price: what can be refused without samples is refused before one is read, and the database
  * is only locked, and only created, when everything that goes into it is there.
@@ -12,6 +12,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -44,6 +45,7 @@ bool import_progress(const import_job *job, const char *stage, double done, int6
     return import_refuse(job, "stopped while %s; the database is as it was",
                          !strcmp(stage, "reading")  ? "reading"
                          : !strcmp(stage, "errors") ? "computing errors"
+                         : !strcmp(stage, "voids")  ? "filling voids"
                                                     : "writing blocks");
 }
 
@@ -91,20 +93,26 @@ static bool check_options(const import_job *job, int count) {
     if (!(o->void_tol > 0 && isfinite(o->void_tol)))
         return import_refuse(job, "a void tolerance of %g: a positive number of metres per metre of eps",
                              o->void_tol);
+    if (o->fill < 0 || o->fill > IMPORT_MOST_FILL)
+        return import_refuse(job, "voids of radius %d cannot be filled: 0 to %d", o->fill, IMPORT_MOST_FILL);
+    if (o->has_sea && !isfinite(o->sea)) return import_refuse(job, "the sea lies at a finite number of metres");
     if (o->jobs < 1 || o->jobs > 1024) return import_refuse(job, "%d jobs: 1 to 1024", o->jobs);
     return true;
 }
 
-/* The default name: the file name up to its first dot, with _ for what a name may not have. */
-static void name_of(const import_options *o, const import_source *first, char name[64]) {
-    if (o->name) {
-        snprintf(name, 64, "%s", o->name);
-        return;
+/* The default name: the first source's file name up to its first dot, with _ for what a name may not have. */
+static bool name_of(const import_job *job, const char *first, char name[64]) {
+    if (job->options->name) {
+        snprintf(name, 64, "%s", job->options->name);
+        return true;
     }
-    size_t n = strcspn(first->base, ".");
+    char *base = import_base_of(first);
+    if (!base) return import_no_memory(job, "naming the terrain");
+    size_t n = strcspn(base, ".");
     if (n > 63) n = 63;
-    memcpy(name, first->base, n);
+    memcpy(name, base, n);
     name[n] = 0;
+    free(base);
     for (size_t i = 0; i < n; i++) {
         char c = name[i];
         bool fine =
@@ -112,23 +120,30 @@ static void name_of(const import_options *o, const import_source *first, char na
         if (!fine) name[i] = '_';
     }
     if (!n) snprintf(name, 64, "terrain");
+    return true;
 }
 
 /* ------------------------------------------------------------------------------------------------ the whole -- */
 typedef struct import_work {
     import_job job;
     const import_force *force; /* for tests; NULL */
+    import_paths paths;
     import_source *sources;
-    int count, described;
+    int count; /* that are described */
     import_mosaic mosaic;
+    import_cover cover;
+    import_conflicts conflicts;
     import_crs crs;
     int k;
     import_plan plan;
     import_pool *pool;
     import_strip all; /* all values, when they are kept */
+    char *spool_path;
+    import_spool *spool; /* NULL: all is read once and kept */
     import_reader *reader;
     import_coarse coarse;
     import_heights heights;
+    import_fill *fill; /* NULL: voids stay */
     rqt_void_cost cost;
     import_stream stream;
     import_database database;
@@ -145,19 +160,133 @@ static int64_t sample_count(const import_work *m) {
     return (int64_t)m->mosaic.lattice.width * m->mosaic.lattice.height;
 }
 
-static bool describe(import_work *m, const char *const *paths) {
-    m->sources = calloc((size_t)m->count, sizeof *m->sources);
-    if (!m->sources) return import_no_memory(&m->job, "describing the sources");
-    for (int i = 0; i < m->count; i++) {
-        m->described = i + 1;
-        if (!import_source_describe(&m->job, paths[i], &m->sources[i])) return false;
+/* A source that was only found in a folder, and is no terrain's: several bands, or none. */
+static bool is_passed_over(import_work *m, const import_path *path) {
+    if (!path->found) return false;
+    CPLPushErrorHandler(CPLQuietErrorHandler);
+    GDALDatasetH d = GDALOpenEx(path->path, GDAL_OF_RASTER | GDAL_OF_READONLY, NULL, NULL, NULL);
+    int bands = d ? GDALGetRasterCount(d) : -1;
+    if (d) GDALClose(d);
+    /* A GeoPackage of tables, say, is identified and has no raster. */
+    if (!d && (d = GDALOpenEx(path->path, GDAL_OF_VECTOR | GDAL_OF_READONLY, NULL, NULL, NULL)) != NULL) {
+        bands = 0;
+        GDALClose(d);
     }
+    CPLPopErrorHandler();
+    if (bands < 0 || bands == 1) return false;
+    if (bands)
+        import_notice(&m->job, "%s is passed over: it has %d bands, and a terrain has one", path->path, bands);
+    else
+        import_notice(&m->job, "%s is passed over: it holds no raster", path->path);
+    return true;
+}
+
+/* Folders and lists become rasters, and rasters descriptions. */
+static bool describe_all(import_work *m, const char *const *arguments, int count) {
+    import_paths *paths = &m->paths;
+    if (!import_paths_find(&m->job, arguments, count, paths)) return false;
+    m->sources = calloc((size_t)paths->count, sizeof *m->sources);
+    if (!m->sources) return import_no_memory(&m->job, "describing the sources");
+    for (int i = 0; i < paths->count; i++) {
+        import_path *path = &paths->path[i];
+        import_source *s = &m->sources[m->count];
+        if (import_source_describe(&m->job, path->path, s)) {
+            if (m->count++) import_source_share_crs(s, &m->sources[0]);
+            continue;
+        }
+        import_source_free(s);
+        if (is_passed_over(m, path)) {
+            path->passed = true;
+            import_refuse(&m->job, "%s", ""); /* it was none */
+            continue;
+        }
+        if (path->line) import_paths_place_sentence(&m->job, paths, path);
+        return false;
+    }
+    if (paths->passed)
+        import_notice(&m->job, "%lld file%s in folders %s no raster%s: passed over", (long long)paths->passed,
+                      paths->passed == 1 ? "" : "s", paths->passed == 1 ? "is" : "are",
+                      paths->passed == 1 ? "" : "s");
+    return m->count > 0 || import_refuse(&m->job, "%s holds no raster of one band", arguments[0]);
+}
+
+/* The report replaces a file: not one that is read, nor the database. */
+static bool check_report(const import_work *m) {
+    const char *report = m->job.options->report;
+    struct stat file, other;
+    if (!report || stat(report, &file)) return true;
+    bool same = !stat(m->job.database, &other) && file.st_dev == other.st_dev && file.st_ino == other.st_ino;
+    for (int i = 0; i < m->count && !same; i++)
+        same = !stat(m->sources[i].path, &other) && file.st_dev == other.st_dev && file.st_ino == other.st_ino;
+    return !same || import_refuse(&m->job, "%s is the database or a source, and cannot be the report too", report);
+}
+
+static bool describe(import_work *m, const char *const *arguments, int count) {
+    if (!describe_all(m, arguments, count)) return false;
+    m->report->sources = m->count;
     if (!import_mosaic_plan(&m->job, m->sources, m->count, &m->mosaic)) return false;
+    if (!import_cover_find(&m->job, m->sources, m->count, &m->mosaic, &m->cover)) return false;
     if (!import_crs_describe(m->sources[0].crs, &m->crs)) return import_no_memory(&m->job, "describing the CRS");
     m->k = m->job.options->k < m->mosaic.lattice.K ? m->job.options->k : m->mosaic.lattice.K;
     m->cost =
         (rqt_void_cost){.cell = import_crs_cell(&m->crs, &m->mosaic.placement), .c = m->job.options->void_tol};
-    return import_plan_make(&m->job, m->sources, m->count, &m->mosaic, m->k, m->force, &m->plan);
+    if (!check_report(m)) return false;
+    m->spool_path = import_spool_path(m->job.database, m->report->name);
+    if (!m->spool_path) return import_no_memory(&m->job, "opening the resume file");
+    /* What an earlier run has read is used, whatever fits in memory now. */
+    const bool spools = m->job.options->resumable || access(m->spool_path, F_OK) == 0;
+    return import_plan_make(&m->job, m->sources, m->count, &m->mosaic, m->k, spools, m->force, &m->plan);
+}
+
+/* ------------------------------------------------------------------------------------------ the resume file -- */
+/* What the sources are, for the resume file to compare. */
+static import_spool_key *keys_of(const import_work *m) {
+    import_spool_key *keys = calloc((size_t)m->count, sizeof *keys);
+    for (int i = 0; keys && i < m->count; i++) {
+        const import_source *s = &m->sources[i];
+        const rqt_unit unit = import_source_unit(s);
+        const int64_t whole[] = {
+            m->mosaic.column[i], m->mosaic.row[i], s->width,         s->height,          s->type,
+            s->flip_rows,        s->flip_columns,  s->has_nodata,    s->nodata_integer,  s->has_mask,
+            s->is_signed_byte,   unit.numerator,   unit.denominator, m->mosaic.is_metres};
+        const double real[] = {s->has_nodata ? s->nodata : 0, unit.scale, unit.offset};
+        uint64_t place = import_mix(0, s->opened, strlen(s->opened));
+        place = import_mix(import_mix(place, whole, sizeof whole), real, sizeof real);
+        keys[i] = (import_spool_key){place, s->content, m->mosaic.row[i], 0};
+    }
+    return keys;
+}
+
+static bool open_spool(import_work *m) {
+    const import_options *o = m->job.options;
+    if (!m->plan.spools) return true;
+    const double nodata[2] = {o->has_nodata, o->has_nodata ? o->nodata : 0};
+    const import_spool_grid grid = {.kind = m->mosaic.kind,
+                                    .width = m->mosaic.lattice.width,
+                                    .height = m->mosaic.lattice.height,
+                                    .strip_rows = m->plan.strip_rows,
+                                    .sources = m->count,
+                                    .options = import_mix(0, nodata, sizeof nodata)};
+    import_spool_key *keys = keys_of(m);
+    const bool ok = keys ? import_spool_open(&m->job, m->spool_path, &grid, keys, &m->spool)
+                         : import_no_memory(&m->job, "opening the resume file");
+    free(keys);
+    if (ok && import_spool_found(m->spool) > 0)
+        import_notice(&m->job, "goes on after row %lld of %d: what was read before is in %s",
+                      (long long)import_spool_found(m->spool) * m->plan.strip_rows <= grid.height
+                          ? (long long)import_spool_found(m->spool) * m->plan.strip_rows
+                          : (long long)grid.height,
+                      grid.height, m->spool_path);
+    return ok;
+}
+
+/* An import that ends before its time says what is left of it. */
+static void tell_spool(import_work *m, bool kept) {
+    char *said = kept && m->job.message ? strdup(m->job.message) : NULL;
+    if (said)
+        import_refuse(&m->job, "%s; what was read is in %s: the same command goes on from there", said,
+                      m->spool_path);
+    free(said);
 }
 
 static void tell_extreme(const import_work *m, double value, int64_t times) {
@@ -171,13 +300,15 @@ static void tell_extreme(const import_work *m, double value, int64_t times) {
 }
 
 /* ------------------------------------------------------------------------------------------ first reading -- */
-static bool start_reader(import_work *m) {
+static bool start_reader(import_work *m, bool first) {
     const import_reader_options options = {.sources = m->sources,
                                            .count = m->count,
                                            .mosaic = &m->mosaic,
                                            .all = m->plan.in_memory ? &m->all : NULL,
                                            .strips = m->plan.strips,
-                                           .strip_rows = m->plan.strip_rows};
+                                           .strip_rows = m->plan.strip_rows,
+                                           .spool = m->spool,
+                                           .conflicts = first ? &m->conflicts : NULL};
     import_reader_free(m->reader);
     m->reader = NULL;
     return import_reader_start(&m->job, &options, &m->reader);
@@ -192,17 +323,26 @@ static bool take_all(import_work *m) {
     return (m->all.values && m->all.valid) || import_no_memory(&m->job, "reading the sources");
 }
 
-static void tell_counts(import_work *m) {
+static bool tell_counts(import_work *m) {
     import_report *report = m->report;
     const import_counts counts = import_reader_counts(m->reader);
     report->samples = sample_count(m);
     report->voids = counts.voids;
     report->overlap = counts.overlap;
     report->overlap_differs = counts.overlap_differs;
-    if (report->overlap_differs > 0)
-        import_notice(&m->job, "%lld of %lld samples that several sources have differ: the later source won",
-                      (long long)report->overlap_differs, (long long)report->overlap);
+    report->samples_read = counts.samples;
+    report->samples_resumed = counts.resumed;
+    report->spooled = m->spool ? (int64_t)import_spool_bytes(m->spool) : 0;
+    const import_findings findings = {.sources = m->sources,
+                                      .count = m->count,
+                                      .mosaic = &m->mosaic,
+                                      .crs = &m->crs,
+                                      .cover = &m->cover,
+                                      .conflicts = &m->conflicts,
+                                      .report = report};
+    import_findings_tell(&m->job, &findings);
     if (report->voids == report->samples) import_notice(&m->job, "every sample is void");
+    return import_findings_write(&m->job, &findings);
 }
 
 /* Looks at the samples, the first of which reads them, until it is clear how they become heights. */
@@ -213,10 +353,10 @@ static bool choose_heights(import_work *m) {
     import_pass pass = {.pool = m->pool, .reader = m->reader, .keep = m->plan.in_memory, .coarse = &m->coarse};
     import_decision decision = IMPORT_LOOK_AGAIN;
     for (bool first = true; decision == IMPORT_LOOK_AGAIN; first = false) {
-        if (!first && !m->plan.in_memory && !start_reader(m)) return false;
+        if (!first && !m->plan.in_memory && !start_reader(m, false)) return false;
         pass.reader = m->reader;
         if (!import_look_at_all(&m->job, &pass, &look)) return false;
-        if (first) tell_counts(m);
+        if (first && !tell_counts(m)) return false;
         decision = import_decide(&m->job, kind, scheme, &look, &m->heights);
         if (first && import_survey_min_is_suspicious(&look.survey))
             tell_extreme(m, look.survey.min, look.survey.min_count);
@@ -233,8 +373,8 @@ static bool read_first(import_work *m) {
     double start = now();
     if (!import_progress(job, "reading", 0, sample_count(m))) return false;
     if (m->plan.in_memory && !take_all(m)) return false;
-    if (!import_coarse_create(job, &m->mosaic.lattice, m->mosaic.kind, m->plan.b, &m->coarse) || !start_reader(m) ||
-        !choose_heights(m))
+    if (!import_coarse_create(job, &m->mosaic.lattice, m->mosaic.kind, m->plan.b, &m->coarse) ||
+        !start_reader(m, true) || !choose_heights(m))
         return false;
     if (!rqt_unit_is_valid(&m->heights.unit))
         return import_refuse(job, "%s: its unit, scale (%g) and offset (%g) make no heights in metres",
@@ -243,17 +383,90 @@ static bool read_first(import_work *m) {
     return true;
 }
 
+/* ------------------------------------------------------------------------------------------------------ voids --
+ */
+/* Metres of the sea as a height. */
+static bool choose_sea(import_work *m, int32_t *sea) {
+    const import_heights *h = &m->heights;
+    const double metres = m->job.options->sea, factor = rqt_unit_factor(&h->unit);
+    const double value = (metres - h->unit.offset) / factor,
+                 q = nearbyint((value - (double)h->unit.z0) * h->unit.d);
+    if (!(fabs(q) < RQT_HEIGHT_LIMIT))
+        return import_refuse(&m->job, "the sea at %.10g m is too far from the terrain's heights", metres);
+    *sea = (int32_t)q;
+    const double real = ((double)h->unit.z0 + q / h->unit.d) * factor + h->unit.offset;
+    if (fabs(real - metres) > 1e-9 * fmax(1, fabs(metres)))
+        import_notice(&m->job, "the sea lies at %.10g m: the terrain's heights are steps of %.10g m", real,
+                      fabs(factor) / h->unit.d);
+    return true;
+}
+
+static bool fill_strip(import_work *m, const import_strip *strip, double *values, int32_t *q) {
+    const size_t width = (size_t)strip->width;
+    for (int32_t y = 0; y < strip->rows; y++) {
+        const size_t at = (size_t)y * width;
+        import_quantise(strip, at, width, &m->heights.steps, values, q);
+        if (!import_fill_row(&m->job, m->fill, q, strip->valid + at)) return false;
+    }
+    return import_progress(&m->job, "voids", (double)(strip->first_row + strip->rows) / m->mosaic.lattice.height,
+                           sample_count(m));
+}
+
+/* All samples once more, for voids that are to become heights. */
+static bool fill_all(import_work *m) {
+    const rqt_lattice *l = &m->mosaic.lattice;
+    double *values = malloc((size_t)l->width * sizeof *values);
+    int32_t *q = malloc((size_t)l->width * sizeof *q);
+    bool ok = (values && q) || import_no_memory(&m->job, "filling voids");
+    if (ok && !m->plan.in_memory) ok = start_reader(m, false);
+    if (ok && m->plan.in_memory) ok = fill_strip(m, &m->all, values, q);
+    for (int32_t end = 0; ok && !m->plan.in_memory && end < l->height;) {
+        const import_strip *strip = import_reader_next(m->reader);
+        ok = strip && fill_strip(m, strip, values, q);
+        if (!ok) break;
+        end = strip->first_row + strip->rows;
+        import_reader_release(m->reader);
+    }
+    free(values);
+    free(q);
+    return ok && import_fill_end(&m->job, m->fill);
+}
+
+static bool fill_voids(import_work *m) {
+    const import_options *o = m->job.options;
+    import_report *r = m->report;
+    import_heights *h = &m->heights;
+    if (!r->voids || !(o->fill || o->has_sea)) return true;
+    double start = now();
+    import_fill_options options = {.width = m->mosaic.lattice.width,
+                                   .height = m->mosaic.lattice.height,
+                                   .radius = o->fill,
+                                   .sea = o->has_sea,
+                                   .memory = m->plan.fill};
+    if (o->has_sea && !choose_sea(m, &options.sea_q)) return false;
+    if (!import_fill_create(&m->job, &options, &m->fill) || !fill_all(m)) return false;
+    r->filled = import_fill_filled(m->fill);
+    r->sea = import_fill_sea(m->fill);
+    const bool none = r->voids == r->samples;
+    r->voids -= r->filled + r->sea;
+    if (r->sea && (none || options.sea_q < h->min_q)) h->min_q = options.sea_q;
+    if (r->sea && (none || options.sea_q > h->max_q)) h->max_q = options.sea_q;
+    r->seconds_read += now() - start;
+    return true;
+}
+
 /* ----------------------------------------------------------------------------------- errors, blocks, database --
  */
 static bool make_blocks(import_work *m) {
     double start = now();
-    if (!m->plan.in_memory && !start_reader(m)) return false;
+    if (!m->plan.in_memory && !start_reader(m, false)) return false;
     m->stream = (import_stream){.lattice = m->mosaic.lattice,
                                 .cost = m->cost,
                                 .k = m->k,
                                 .plan = &m->plan,
                                 .heights = &m->heights,
                                 .has_voids = m->report->voids > 0,
+                                .fill = m->fill,
                                 .pool = m->pool,
                                 .coarse = &m->coarse,
                                 .all = m->plan.in_memory ? &m->all : NULL,
@@ -281,13 +494,42 @@ static bool write_minimal(import_work *m) {
     return code == SQLITE_OK || import_database_refuse(&m->job, code, detail);
 }
 
-/* File names, one a line. */
+/* What was named, one a line; of a folder and of a list also how many rasters it stands for. */
 static char *provenance(const import_work *m) {
-    size_t size = 1;
-    for (int i = 0; i < m->count; i++) size += strlen(m->sources[i].base) + 1;
-    char *text = malloc(size), *end = text;
-    for (int i = 0; text && i < m->count; i++) end += sprintf(end, "%s%s", i ? "\n" : "", m->sources[i].base);
-    return text;
+    const import_paths *p = &m->paths;
+    char *text = NULL;
+    size_t size = 0;
+    bool whole = true;
+    FILE *out = open_memstream(&text, &size);
+    for (int a = 0, i = 0; out && a < p->arguments; a++) {
+        int rasters = 0;
+        bool itself = false;
+        for (; i < p->count && p->path[i].argument == a; i++, rasters += !p->path[i - 1].passed)
+            itself = !p->path[i].line && !p->path[i].found;
+        char *base = import_base_of(p->argument[a]);
+        whole = whole && base;
+        fprintf(out, "%s%s", a ? "\n" : "", base ? base : "");
+        if (!itself) fprintf(out, " (%d raster%s)", rasters, rasters == 1 ? "" : "s");
+        free(base);
+    }
+    if (out && !fclose(out) && whole) return text;
+    free(text);
+    return NULL;
+}
+
+/* What was filled, into its table. */
+static bool write_fill(import_work *m, store_writer *writer) {
+    import_fill_reader *reader = NULL;
+    import_fill_run run;
+    bool failed = false, ok = import_fill_reader_create(&m->job, m->fill, &reader);
+    while (ok && import_fill_next(&m->job, reader, &run, &failed)) {
+        char *detail = NULL;
+        const int code =
+            store_writer_fill(writer, run.row, run.first, run.last, run.sea ? STORE_SEA : STORE_FILLED, &detail);
+        ok = code == SQLITE_OK || import_database_refuse(&m->job, code, detail);
+    }
+    import_fill_reader_free(reader);
+    return ok && !failed;
 }
 
 static bool write_terrain(import_work *m, store_terrain *info) {
@@ -300,6 +542,7 @@ static bool write_terrain(import_work *m, store_terrain *info) {
         if (code != SQLITE_OK) ok = import_database_refuse(job, code, detail);
     }
     ok = ok && import_write(job, &m->stream, writer, m->report);
+    if (ok && m->fill) ok = write_fill(m, writer);
     if (ok) {
         const rqt_code max_error = m->stream.build ? rqt_build_max_error(m->stream.build) : 0;
         int code = store_writer_finish(writer, max_error, &detail);
@@ -340,35 +583,63 @@ static bool write_database(import_work *m) {
     return ok;
 }
 
+#define READDIR "GDAL_DISABLE_READDIR_ON_OPEN"
+#define POOL "GDAL_MAX_DATASET_POOL_SIZE"
+
+/* For each dataset GDAL reads its whole folder, to see what stands beside; among thousands of tiles it does better
+ * to ask for the names that it looks for. And a VRT keeps a hundred tiles open, if it may. What the user has set
+ * stays. begin: or put back. */
+static void tune_gdal(const char *const *sources, int count, bool begin, bool set[2]) {
+    bool many = count > 32;
+    for (int i = 0; i < count && !many; i++) many = *sources[i] == '@' || import_is_folder(sources[i]);
+    if (begin) {
+        set[0] = many && !CPLGetConfigOption(READDIR, NULL);
+        set[1] = !CPLGetConfigOption(POOL, NULL);
+    }
+    char most[16];
+    snprintf(most, sizeof most, "%d", import_reading_most_open() < 100 ? import_reading_most_open() : 100);
+    if (set[0]) CPLSetConfigOption(READDIR, begin ? "TRUE" : NULL);
+    if (set[1]) CPLSetConfigOption(POOL, begin ? most : NULL);
+}
+
 int import_run_forced(const char *const *sources, int count, const char *database, const import_options *options,
                       const import_force *force, import_report *report, char *message, size_t message_size) {
-    import_work m = {
-        .job = {options, database, message, message_size}, .force = force, .count = count, .report = report};
+    import_work m = {.job = {options, database, message, message_size}, .force = force, .report = report};
     *report = (import_report){0};
     if (message && message_size) message[0] = 0;
     GDALAllRegister();
     /* GDAL's words belong into our sentences, not onto the terminal. */
     CPLPushErrorHandler(CPLQuietErrorHandler);
     GIntBig cache = GDALGetCacheMax64();
+    bool tuned[2];
+    tune_gdal(sources, count, true, tuned);
 
-    bool ok = check_options(&m.job, count) && describe(&m, sources);
-    if (ok) name_of(options, &m.sources[0], report->name);
+    bool ok =
+        check_options(&m.job, count) && name_of(&m.job, sources[0], report->name) && describe(&m, sources, count);
     if (ok) GDALSetCacheMax64(m.plan.gdal_cache);
-    ok = ok && import_database_probe(&m.job, report->name) && import_pool_create(&m.job, &m.pool) &&
-         read_first(&m) && make_blocks(&m) && write_database(&m);
+    ok = ok && import_database_probe(&m.job, report->name) && open_spool(&m) &&
+         import_pool_create(&m.job, &m.pool) && read_first(&m) && fill_voids(&m) && make_blocks(&m) &&
+         write_database(&m);
 
     import_database_close(&m.job, &m.database);
     import_reader_free(m.reader);
+    tell_spool(&m, import_spool_close(m.spool, !ok));
+    free(m.spool_path);
     import_stream_free(&m.stream);
     import_coarse_free(&m.coarse);
+    import_fill_free(m.fill);
     import_pool_free(m.pool);
     free(m.all.values);
     free(m.all.valid);
     import_crs_free(&m.crs);
+    import_conflicts_free(&m.conflicts);
+    import_cover_free(&m.cover);
     import_mosaic_free(&m.mosaic);
-    for (int i = 0; i < m.described; i++) import_source_free(&m.sources[i]);
+    for (int i = 0; i < m.count; i++) import_source_free(&m.sources[i]);
     free(m.sources);
+    import_paths_free(&m.paths);
     GDALSetCacheMax64(cache);
+    tune_gdal(sources, count, false, tuned);
     CPLPopErrorHandler();
     return ok ? 0 : 1;
 }

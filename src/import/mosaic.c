@@ -2,7 +2,9 @@
  *
  * The first source's grid is the grid: every other one must have its CRS, its cell size and a whole number of cells
  * between the two, each within a thousandth of a cell over the whole source. What the union holds and no source
- * covers is void. Where sources overlap, the later one wins; read.c counts.
+ * covers is void. Where sources overlap, the later one wins; read.c counts. Sources of which that is nowhere the
+ * case make the same terrain in any order: its coordinates are those of the source that its corner is nearest to,
+ * not of the one that was named first.
  */
 #include "source.h"
 
@@ -12,8 +14,8 @@
 #define SLACK 1e-3 /* cells */
 
 /* One axis of source s against the first: the cell at which s begins. */
-static bool align(const import_job *job, const import_source *first, const import_source *s, bool rows,
-                  int64_t *cell) {
+bool import_mosaic_align(const import_job *job, const import_source *first, const import_source *s, bool rows,
+                         int64_t *cell) {
     double from = rows ? first->placement.y0 : first->placement.x0, to = rows ? s->placement.y0 : s->placement.x0;
     double step = rows ? first->placement.dy : first->placement.dx, own = rows ? s->placement.dy : s->placement.dx;
     int32_t n = rows ? s->height : s->width;
@@ -36,6 +38,28 @@ static bool align(const import_job *job, const import_source *first, const impor
     return true;
 }
 
+/* Coordinates come from sources that touch the edge in question, so that they carry no rounding of ours: x from the
+ * northernmost of the west, y from the westernmost of the north, and the cells from the one that is first by row.
+ * Among those of one place, where files differ in the last digit, the smallest value. */
+static rqt_placement placement_of(const import_source *sources, int count, const import_mosaic *m) {
+    int x = -1, y = -1, cell = 0;
+    for (int i = 0; i < count; i++) {
+        const rqt_placement *p = &sources[i].placement;
+        if (m->column[i] == 0 &&
+            (x < 0 || m->row[i] < m->row[x] || (m->row[i] == m->row[x] && p->x0 < sources[x].placement.x0)))
+            x = i;
+        if (m->row[i] == 0 && (y < 0 || m->column[i] < m->column[y] ||
+                               (m->column[i] == m->column[y] && p->y0 < sources[y].placement.y0)))
+            y = i;
+        const rqt_placement *c = &sources[cell].placement;
+        const int64_t own = ((int64_t)m->row[i] << 32) + m->column[i],
+                      other = ((int64_t)m->row[cell] << 32) + m->column[cell];
+        if (own < other || (own == other && (p->dx < c->dx || (p->dx == c->dx && p->dy < c->dy)))) cell = i;
+    }
+    return (rqt_placement){sources[x].placement.x0, sources[y].placement.y0, sources[cell].placement.dx,
+                           sources[cell].placement.dy};
+}
+
 static bool place(const import_job *job, const import_source *sources, int count, import_mosaic *m) {
     const import_source *first = &sources[0];
     int64_t west = 0, north = 0, east = first->width, south = first->height;
@@ -48,7 +72,8 @@ static bool place(const import_job *job, const import_source *sources, int count
             return import_refuse(job, "%s has no geotransform: it cannot be placed beside %s",
                                  s->placed ? first->path : s->path, s->placed ? s->path : first->path);
         int64_t x = 0, y = 0;
-        if (!align(job, first, s, false, &x) || !align(job, first, s, true, &y)) return false;
+        if (!import_mosaic_align(job, first, s, false, &x) || !import_mosaic_align(job, first, s, true, &y))
+            return false;
         m->column[i] = (int32_t)x;
         m->row[i] = (int32_t)y;
         if (x < west) west = x;
@@ -60,15 +85,11 @@ static bool place(const import_job *job, const import_source *sources, int count
         return import_refuse(job, "%s%s: %lld x %lld samples; a terrain has at most %d a side", first->path,
                              count > 1 ? " and the other sources together" : "", (long long)(east - west),
                              (long long)(south - north), (1 << RQT_MAX_K) + 1);
-    /* Coordinates come from a source that touches the edge in question, so that they carry no rounding of ours. */
-    m->placement = first->placement;
-    bool have_x = west == 0, have_y = north == 0;
     for (int i = 0; i < count; i++) {
-        if (!have_x && m->column[i] == west) m->placement.x0 = sources[i].placement.x0, have_x = true;
-        if (!have_y && m->row[i] == north) m->placement.y0 = sources[i].placement.y0, have_y = true;
         m->column[i] = (int32_t)(m->column[i] - west);
         m->row[i] = (int32_t)(m->row[i] - north);
     }
+    m->placement = placement_of(sources, count, m);
     return true;
 }
 

@@ -1,20 +1,26 @@
 /* parts.h - what the files of the import share: how they refuse, how they tell, and the path that samples take.
  *
+ *   sources.c   what the user named -> rasters: a file, a folder of them, a list
  *   source.c    one GDAL source, described: type, place, CRS, what is void            (crs.c, units.c help)
  *   mosaic.c    all sources on one grid, and the kind of number that holds them all
+ *   cover.c     gaps that no source covers, sources that overlap                      (conflict.c: that disagree)
+ *   report.c    all of that as sentences, and as a GeoJSON file
  *   plan.c      how much memory for what: one reading of the sources or two, the size of tiles, the buffers
  *   read.c      GDAL windows -> values + validity of some rows of the grid
+ *   spool.c     the resume file: strips that were read, for the second reading and for another run (spool_codec.c)
  *   reader.c    a thread that reads ahead, strip by strip, from north to south
  *   survey.c    a look at all values: extremes, and which steps of height would hold them exactly
  *   quantise.c  that look -> rqt_unit; values -> int32 heights q
+ *   fill.c      small voids filled, the sea put in, both noted down
  *   pool.c      threads that share the items of a task
  *   stream.c    heights -> saturated errors -> blocks, band by band               (core: rqt_sweep, rqt_build)
  *   stage.c     encoded blocks wait for their turn, in memory or on a scratch file (scratch.c)
  *   write.c     all of them into the store, in ascending order of number
  *   database.c  the SQLite file: opened, refused, committed or left as it was
  *   import.c    the whole
+ *   update.c    another way through source.c to quantise.c: sources into a terrain that is there
  *
- * Only source.c, crs.c and read.c know GDAL; database.c and write.c only know SQLite and the store.
+ * Only sources.c, source.c, crs.c and read.c know GDAL; database.c and write.c only know SQLite and the store.
  */
 #ifndef RQT_IMPORT_PARTS_H
 #define RQT_IMPORT_PARTS_H
@@ -70,7 +76,30 @@ typedef struct import_strip {
 
 typedef struct import_counts {
     int64_t voids, overlap, overlap_differs;
+    int64_t samples; /* asked of the sources; where they overlap, of each */
+    int64_t resumed; /* the same, that an earlier run has asked for */
 } import_counts;
+
+/* -------------------------------------------------------------------------------------------- conflict.c --
+ * Two sources that disagree where both have data. Order of the sources: a < b. */
+typedef struct import_conflict {
+    int32_t a, b;
+    int64_t differ;      /* samples */
+    double largest;      /* difference, in the unit of the values */
+    int32_t column, row; /* the first place, in the order of rows, with the largest */
+    int32_t first_column, first_row;
+} import_conflict;
+
+typedef struct import_conflicts {
+    import_conflict *pair; /* each pair once; in no order that means anything */
+    size_t count, last;
+    uint32_t *slot; /* hash of the pairs, 1 + index */
+    size_t slots;
+} import_conflicts;
+
+bool import_conflicts_add(import_conflicts *conflicts, const import_conflict *one); /* false: out of memory */
+void import_conflicts_clear(import_conflicts *conflicts);
+void import_conflicts_free(import_conflicts *conflicts);
 
 /* n values of a strip, from index `at` on, as doubles. Exact but for I64 beyond 2^53. survey.c */
 void import_strip_doubles(const import_strip *strip, size_t at, size_t n, double *out);
@@ -200,12 +229,13 @@ import_scratch *import_stage_scratch(import_stage *stage);
 /* -------------------------------------------------------------------------------------------------- plan.c --
  * Bytes for everything, within options->memory. */
 typedef struct import_plan {
-    bool in_memory; /* all values are kept: the sources are read once */
+    bool in_memory; /* all values are kept */
+    bool spools;    /* what is read goes into a resume file; so it does when it is not kept */
     int b;          /* tiles of 2^b */
     int32_t strip_rows;
     int strips; /* of the reader's ring, when not in memory */
     int64_t gdal_cache, page_cache;
-    uint64_t stage, kept; /* memory of the scratches: of blocks, of the build's lattice */
+    uint64_t stage, kept, fill; /* memory of the scratches: of blocks, of the build's lattice, of what was filled */
 } import_plan;
 
 /* For tests: what the plan would otherwise choose. 0, or -1 for `stage` and `kept`: chosen. */
@@ -218,11 +248,50 @@ typedef struct import_force {
 struct import_source;
 struct import_mosaic;
 #define IMPORT_PROCESS_BYTES ((int64_t)58 << 20) /* measured: code, GDAL with its drivers, PROJ, SQLite */
+/* spools: in any case. */
 bool import_plan_make(const import_job *job, const struct import_source *sources, int count,
-                      const struct import_mosaic *mosaic, int k, const import_force *force, import_plan *plan);
+                      const struct import_mosaic *mosaic, int k, bool spools, const import_force *force,
+                      import_plan *plan);
 
 int import_run_forced(const char *const *sources, int count, const char *database, const import_options *options,
                       const import_force *force, import_report *report, char *message, size_t message_size);
+
+/* ------------------------------------------------------------------------------------------------- spool.c -- */
+typedef struct import_spool import_spool;
+
+/* What a resume file is of: where each source is on the grid, and what it is. */
+typedef struct import_spool_key {
+    uint64_t place;   /* of what must be alike: name, place, type */
+    uint64_t content; /* of size and time of its files */
+    int32_t row, zero;
+} import_spool_key;
+
+typedef struct import_spool_grid {
+    import_kind kind;
+    int32_t width, height, strip_rows, sources;
+    uint64_t options; /* of those that change values */
+} import_spool_grid;
+
+/* A hash that goes on: 0 begins. */
+uint64_t import_mix(uint64_t hash, const void *bytes, size_t size);
+/* DATABASE.TERRAIN.rqt-import; free(). NULL: out of memory. */
+char *import_spool_path(const char *database, const char *terrain);
+/* Take up the file where it is of these sources, else begin anew; says which, when there was a file. Refuses one
+ * that is not ours or that another import uses. */
+bool import_spool_open(const import_job *job, const char *path, const import_spool_grid *grid,
+                       const import_spool_key *keys, import_spool **spool);
+int32_t import_spool_strips(const import_spool *spool); /* that it has */
+int32_t import_spool_found(const import_spool *spool);  /* of them, from an earlier run */
+uint64_t import_spool_bytes(const import_spool *spool);
+/* Strip n with its values, counts and conflicts (NULL: not wanted). False: it is not sound; it and all behind it
+ * are forgotten. */
+bool import_spool_read(import_spool *spool, int32_t n, import_strip *strip, import_counts *counts,
+                       import_conflicts *conflicts);
+/* The strip after the last one. */
+bool import_spool_append(const import_job *job, import_spool *spool, const import_strip *strip,
+                         const import_counts *counts, const import_conflicts *conflicts);
+/* keep: the file stays, for another run, if there is anything in it. Did it? */
+bool import_spool_close(import_spool *spool, bool keep);
 
 /* ------------------------------------------------------------------------------------------------ reader.c --
  * The rows of the grid from north to south, as often as they are wanted. */
@@ -235,6 +304,8 @@ typedef struct import_reader_options {
     import_strip *all; /* everything goes here and stays; or NULL: */
     int strips;        /* so many at a time */
     int32_t strip_rows;
+    import_spool *spool;         /* strips that it has come from there, the others go there; or NULL */
+    import_conflicts *conflicts; /* to be added to; or NULL */
 } import_reader_options;
 
 bool import_reader_start(const import_job *job, const import_reader_options *options, import_reader **reader);
@@ -246,6 +317,42 @@ void import_reader_release(import_reader *reader);
 void import_reader_extent(const import_reader *reader, int32_t *width, int32_t *height);
 import_counts import_reader_counts(const import_reader *reader); /* after the last strip */
 void import_reader_free(import_reader *reader);
+
+/* -------------------------------------------------------------------------------------------------- fill.c --
+ * Voids that the user wants to be heights: see there. Rows go in from north to south; what was filled comes out in
+ * the same order, as often as wanted. */
+typedef struct import_fill import_fill;
+
+typedef struct import_fill_options {
+    int32_t width, height;
+    int radius; /* of voids that are filled, 0: none */
+    bool sea;   /* every void that is left becomes sea_q */
+    int32_t sea_q;
+    uint64_t memory; /* of what is noted down; the rest is in a scratch file */
+} import_fill_options;
+
+size_t import_fill_bytes(int32_t width, int radius); /* of memory, beside options->memory */
+bool import_fill_create(const import_job *job, const import_fill_options *options, import_fill **fill);
+void import_fill_free(import_fill *fill);
+/* The next row. */
+bool import_fill_row(const import_job *job, import_fill *fill, const int32_t *q, const uint8_t *valid);
+bool import_fill_end(const import_job *job, import_fill *fill); /* after the last one */
+int64_t import_fill_filled(const import_fill *fill);            /* samples */
+int64_t import_fill_sea(const import_fill *fill);
+
+/* What is noted down, read again. */
+typedef struct import_fill_run {
+    int32_t row, first, last;
+    bool sea;
+    const int32_t *q; /* of each sample; of the sea NULL. Valid until the next call */
+} import_fill_run;
+typedef struct import_fill_reader import_fill_reader;
+bool import_fill_reader_create(const import_job *job, import_fill *fill, import_fill_reader **reader);
+void import_fill_reader_free(import_fill_reader *reader);
+/* false: the end, or it cannot be read: then *failed. */
+bool import_fill_next(const import_job *job, import_fill_reader *reader, import_fill_run *run, bool *failed);
+/* Put what was filled of this row into it; valid may be NULL. Rows come in ascending order. */
+bool import_fill_apply(const import_job *job, import_fill_reader *reader, int32_t row, int32_t *q, uint8_t *valid);
 
 /* ------------------------------------------------------------------------------------------------ coarse.c --
  * What the first reading keeps for the second: every 2^b-th value of every 2^b-th row, and the last ones. */
@@ -262,7 +369,7 @@ void import_coarse_free(import_coarse *coarse);
 void import_coarse_keep(import_coarse *coarse, const import_strip *strip);
 /* All of it into the sweep. */
 bool import_coarse_give(const import_job *job, const import_coarse *coarse, const import_steps *steps,
-                        bool has_voids, rqt_sweep *sweep);
+                        bool has_voids, import_fill *fill, rqt_sweep *sweep);
 
 /* -------------------------------------------------------------------------------------------------- pass.c -- */
 typedef struct import_pass {
@@ -283,7 +390,8 @@ typedef struct import_stream {
     int k;
     const import_plan *plan;
     const import_heights *heights;
-    bool has_voids;
+    bool has_voids;    /* that are left when all is filled that is to be */
+    import_fill *fill; /* NULL: nothing is filled */
     import_pool *pool;
     const import_coarse *coarse;
     const import_strip *all; /* the values; NULL: they come from the reader */
@@ -318,6 +426,8 @@ bool import_database_probe(const import_job *job, const char *terrain);
 /* Open, create if needed, and begin the transaction. page_cache: the most bytes that SQLite keeps of the database.
  */
 bool import_database_begin(const import_job *job, int k, int64_t page_cache, import_database *database);
+/* Open one that is there, for changes to it: journal and pages stay as they are. Begins the transaction. */
+bool import_database_change(const import_job *job, import_database *database);
 bool import_database_commit(const import_job *job, import_database *database);
 /* Close. Without a commit before, the database is as it was, and a file that we created is gone. */
 void import_database_close(const import_job *job, import_database *database);

@@ -1,13 +1,14 @@
 /* plan.c - bytes for everything, within the memory that the user allows.
  *
- * When all values fit, they are read once and kept. Else the sources are read twice, and of the raster only two
- * bands, a few strips and the coarse lattice are in memory. The larger the tiles, the less work and the more
- * memory; the first of these choices that fits is taken, and what is left then goes where it saves a file or a
- * wait.
+ * When all values fit, they are read once and kept. Else they are read twice, the second time from the resume file,
+ * and of the raster only two bands, a few strips and the coarse lattice are in memory. The larger the tiles, the
+ * less work and the more memory; the first of these choices that fits is taken, and what is left then goes where it
+ * saves a file or a wait.
  *
  * Counted is the worst case: everything that any moment of the import may hold at once.
  */
 #include "source.h"
+#include "spool.h"
 
 #include <math.h>
 
@@ -18,6 +19,9 @@
 #define LEAST_PAGES (4 * MIB) /* of SQLite's */
 #define MOST_PAGES (32 * MIB)
 #define MOST_STAGE (512 * MIB)
+#define MOST_STRIP 256 /* rows */
+#define FILL_NOTES (8 * MIB)
+#define SOURCE_BYTES 1024 /* its description, with its names */
 
 typedef struct needs {
     const import_job *job;
@@ -25,6 +29,7 @@ typedef struct needs {
     int count;
     const import_mosaic *mosaic;
     int k;
+    bool spools;
 } needs;
 
 static int64_t row_bytes(const needs *n) {
@@ -39,15 +44,18 @@ static int64_t kept_bytes(const needs *n, int b) {
     return b < l->K ? (across / 2 + 2) * (down / 2 + 2) * 8 : 0;
 }
 
-static int32_t strip_rows(const needs *n, int b) {
+/* The same for any memory: a resume file is of strips. */
+static int32_t strip_rows(const needs *n) {
     const int64_t rows = STRIP_BYTES / row_bytes(n), most = n->mosaic->lattice.height;
-    const int64_t chosen = rows < 1 ? 1 : rows > (int64_t)1 << b ? (int64_t)1 << b : rows;
+    const int64_t chosen = rows < 1 ? 1 : rows > MOST_STRIP ? MOST_STRIP : rows;
     return (int32_t)(chosen < most ? chosen : most);
 }
 
 /* A plan for tiles of this size with as little of everything else as will do. */
 static import_plan least(const needs *n, bool in_memory, int b) {
-    import_plan p = {.in_memory = in_memory, .b = b, .strip_rows = strip_rows(n, b), .strips = 2};
+    import_plan p = {.in_memory = in_memory, .b = b, .strip_rows = strip_rows(n), .strips = 2};
+    p.spools = n->spools || !in_memory;
+    p.fill = n->job->options->fill || n->job->options->has_sea ? (uint64_t)FILL_NOTES : 0;
     const int64_t cache = import_reading_cache(n->sources, n->count, n->mosaic, p.strip_rows);
     p.gdal_cache = cache + cache / 8 + LEAST_CACHE;
     p.page_cache = LEAST_PAGES;
@@ -74,8 +82,12 @@ static int64_t bytes_of(const needs *n, const import_plan *p) {
     /* A small raster does not fill GDAL's cache. */
     const int64_t raster = samples * kind;
     bytes += p->gdal_cache < raster ? p->gdal_cache : raster;
-    bytes += (int64_t)import_reading_bytes(n->sources, n->count, n->mosaic->kind, p->strip_rows);
+    bytes += (int64_t)import_reading_bytes(n->sources, n->count, n->mosaic, p->strip_rows);
     bytes += (int64_t)import_coarse_bytes(l, n->mosaic->kind, p->b);
+    if (p->spools) bytes += (int64_t)spool_codec_bytes(n->mosaic->kind, l->width, p->strip_rows);
+    if (p->fill)
+        bytes += (int64_t)(p->fill + import_fill_bytes(l->width, n->job->options->fill)) + row_bytes(n) * 2;
+    bytes += (int64_t)n->count * SOURCE_BYTES;
     bytes += (int64_t)rqt_sweep_bytes(&sweep) + (int64_t)rqt_build_bytes(l, n->k, p->b);
     bytes += (int64_t)import_stage_bytes(l, n->k);
     if (n->job->options->minimal) bytes += (int64_t)store_minimal_bytes(l, n->k, true);
@@ -124,8 +136,8 @@ static bool check_minimal(const needs *n) {
 }
 
 bool import_plan_make(const import_job *job, const import_source *sources, int count, const import_mosaic *mosaic,
-                      int k, const import_force *force, import_plan *plan) {
-    const needs n = {job, sources, count, mosaic, k};
+                      int k, bool spools, const import_force *force, import_plan *plan) {
+    const needs n = {job, sources, count, mosaic, k, spools};
     const int K = mosaic->lattice.K, lowest = k > 1 ? k : 1;
     int highest = BEST_B > lowest ? BEST_B : lowest, from = lowest;
     if (highest > K) highest = K;

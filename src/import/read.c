@@ -3,7 +3,7 @@
  * A strip is read from every source that meets its rows, turned north-up and west-first on the way. A sample is
  * void when it is a declared or given nodata value, NaN, or masked. A void never replaces data; data replaces
  * earlier data, and while that happens bits in `valid` remember it, so that three sources over one place count it
- * once.
+ * once. Beside each value stands the source that it is from, so that two which disagree can be named (conflict.c).
  *
  * A source is open while strips meet it, so that the rows of a GDAL block which a strip leaves over come out of
  * GDAL's cache, and every compressed block is decoded once.
@@ -16,6 +16,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 
 #define HAS_DATA 1
 #define OVERLAPS 2
@@ -73,14 +74,25 @@ typedef struct merge {
     bool scaled;
     size_t target;     /* of the row's first sample in file order */
     ptrdiff_t forward; /* 1, or -1 for columns that run west */
+    int32_t index;     /* of the source */
+    int32_t *owner;    /* of each value of the grid, the source it is from */
+    import_conflicts *conflicts;
+    bool failed; /* no memory for a conflict */
 } merge;
 
-static inline uint8_t merged(uint8_t before, bool differs) {
-    if (!before) return HAS_DATA;
-    return (uint8_t)(before | OVERLAPS | (differs ? DIFFERS : 0));
+/* There is a value already. */
+static void meet(merge *m, size_t n, double difference) {
+    uint8_t *valid = &m->grid->valid[n];
+    *valid |= OVERLAPS;
+    if (difference == 0) return;
+    *valid |= DIFFERS;
+    const int32_t row = m->grid->first_row + (int32_t)(n / (size_t)m->grid->width),
+                  column = (int32_t)(n % (size_t)m->grid->width);
+    const import_conflict one = {m->owner[n], m->index, 1, fabs(difference), column, row, column, row};
+    if (!import_conflicts_add(m->conflicts, &one)) m->failed = true;
 }
 
-static void merge_i32(const merge *m, const int32_t *row, const uint8_t *mask) {
+static void merge_i32(merge *m, const int32_t *row, const uint8_t *mask) {
     int32_t *values = m->grid->values;
     uint8_t *valid = m->grid->valid;
     size_t n = m->target;
@@ -88,12 +100,20 @@ static void merge_i32(const merge *m, const int32_t *row, const uint8_t *mask) {
         int32_t value = row[i];
         if (m->source->is_signed_byte && value > 127) value -= 256;
         if ((mask && !mask[i]) || is_void_integer(&m->voids, value)) continue;
-        valid[n] = merged(valid[n], values[n] != value);
+        if (valid[n]) meet(m, n, (double)value - (double)values[n]);
+        valid[n] |= HAS_DATA;
         values[n] = value;
+        m->owner[n] = m->index;
     }
 }
 
-static void merge_i64(const merge *m, const int64_t *row, const uint8_t *mask) {
+/* Integers that differ by less than a double tells do differ. */
+static double difference_i64(int64_t a, int64_t b) {
+    const double d = (double)a - (double)b;
+    return a != b && d == 0 ? 1 : d;
+}
+
+static void merge_i64(merge *m, const int64_t *row, const uint8_t *mask) {
     int64_t *values = m->grid->values;
     uint8_t *valid = m->grid->valid;
     size_t n = m->target;
@@ -101,13 +121,15 @@ static void merge_i64(const merge *m, const int64_t *row, const uint8_t *mask) {
         int64_t value = row[i];
         if (m->source->is_signed_byte && value > 127) value -= 256;
         if ((mask && !mask[i]) || is_void_integer(&m->voids, value)) continue;
-        valid[n] = merged(valid[n], values[n] != value);
+        if (valid[n]) meet(m, n, difference_i64(value, values[n]));
+        valid[n] |= HAS_DATA;
         values[n] = value;
+        m->owner[n] = m->index;
     }
 }
 
 /* Both return the column (of the file) of an infinite height, or -1. */
-static int32_t merge_f32(const merge *m, const float *row, const uint8_t *mask) {
+static int32_t merge_f32(merge *m, const float *row, const uint8_t *mask) {
     float *values = m->grid->values;
     uint8_t *valid = m->grid->valid;
     size_t n = m->target;
@@ -116,13 +138,15 @@ static int32_t merge_f32(const merge *m, const float *row, const uint8_t *mask) 
         if (m->source->is_signed_byte && value > 127) value -= 256;
         if ((mask && !mask[i]) || is_void_real(&m->voids, value)) continue;
         if (isinf(value)) return i;
-        valid[n] = merged(valid[n], !(values[n] == value));
+        if (valid[n]) meet(m, n, (double)value - (double)values[n]);
+        valid[n] |= HAS_DATA;
         values[n] = value;
+        m->owner[n] = m->index;
     }
     return -1;
 }
 
-static int32_t merge_f64(const merge *m, const double *row, const uint8_t *mask) {
+static int32_t merge_f64(merge *m, const double *row, const uint8_t *mask) {
     double *values = m->grid->values;
     uint8_t *valid = m->grid->valid;
     size_t n = m->target;
@@ -132,13 +156,15 @@ static int32_t merge_f64(const merge *m, const double *row, const uint8_t *mask)
         if ((mask && !mask[i]) || is_void_real(&m->voids, value)) continue;
         if (m->scaled) value = value * m->factor + m->unit.offset;
         if (isinf(value)) return i;
-        valid[n] = merged(valid[n], !(values[n] == value));
+        if (valid[n]) meet(m, n, (double)value - (double)values[n]);
+        valid[n] |= HAS_DATA;
         values[n] = value;
+        m->owner[n] = m->index;
     }
     return -1;
 }
 
-static int32_t merge_row(const merge *m, const char *row, const uint8_t *mask) {
+static int32_t merge_row(merge *m, const char *row, const uint8_t *mask) {
     switch (m->grid->kind) {
     case IMPORT_I32:
         merge_i32(m, (const int32_t *)(const void *)row, mask);
@@ -155,15 +181,18 @@ static int32_t merge_row(const merge *m, const char *row, const uint8_t *mask) {
 }
 
 /* ------------------------------------------------------------------------------------------------- strips -- */
-#define MOST_OPEN 200 /* sources; beyond, each is closed after every strip */
+#define MOST_OPEN 200  /* sources; beyond, each is closed after every strip */
+#define OTHER_FILES 32 /* that a process has open: streams, libraries, the database */
 
 struct import_reading {
     const import_job *job;
     const import_source *sources;
     const import_mosaic *mosaic;
-    int count, open;
+    int count, open, most_open;
     GDALDatasetH *dataset; /* of each source; NULL: closed */
-    char *rows;            /* of a source, as they are in its file */
+    int32_t *owner;        /* see merge */
+    import_conflicts conflicts;
+    char *rows; /* of a source, as they are in its file */
     uint8_t *mask;
 };
 
@@ -182,28 +211,54 @@ static void widest(const import_source *sources, int count, int32_t strip_rows, 
     }
 }
 
-size_t import_reading_bytes(const import_source *sources, int count, import_kind kind, int32_t strip_rows) {
+size_t import_reading_bytes(const import_source *sources, int count, const import_mosaic *mosaic,
+                            int32_t strip_rows) {
     size_t samples, masked;
     widest(sources, count, strip_rows, &samples, &masked);
-    return samples * import_kind_bytes(kind) + masked;
+    return samples * import_kind_bytes(mosaic->kind) + masked +
+           (size_t)mosaic->lattice.width * (size_t)strip_rows * sizeof(int32_t);
+}
+
+/* Sources that may be open at once: a dataset has a file, and often one beside it. */
+int import_reading_most_open(void) {
+    struct rlimit files;
+    if (getrlimit(RLIMIT_NOFILE, &files) || files.rlim_cur == RLIM_INFINITY) return MOST_OPEN;
+    const int64_t half = ((int64_t)files.rlim_cur - OTHER_FILES) / 2;
+    return half < 1 ? 1 : half < MOST_OPEN ? (int)half : MOST_OPEN;
+}
+
+/* Bytes that come and go with a source, when strips move south. */
+typedef struct change {
+    int32_t row;
+    int64_t bytes;
+} change;
+
+static int by_row(const void *a, const void *b) {
+    const change *x = a, *y = b;
+    if (x->row != y->row) return x->row < y->row ? -1 : 1;
+    return (x->bytes > y->bytes) - (x->bytes < y->bytes); /* what goes, first */
 }
 
 int64_t import_reading_cache(const import_source *sources, int count, const import_mosaic *mosaic,
                              int32_t strip_rows) {
-    int64_t most = 0;
+    change *changes = malloc(2 * (size_t)count * sizeof *changes);
+    if (!changes) return INT64_MAX / 4; /* no plan fits */
     for (int i = 0; i < count; i++) {
-        /* All sources that the strip at the beginning of this one may meet, a row of blocks each. */
-        int64_t bytes = 0;
-        for (int j = 0; j < count; j++) {
-            const import_source *s = &sources[j];
-            if (mosaic->row[j] >= mosaic->row[i] + strip_rows || mosaic->row[j] + s->height <= mosaic->row[i])
-                continue;
-            const int64_t across = (s->width + s->block_columns - 1) / s->block_columns;
-            bytes += across * s->block_columns * s->block_rows *
-                     (GDALGetDataTypeSizeBytes(s->type) + (s->has_mask ? 1 : 0));
-        }
+        /* A row of blocks of each source that a strip may meet. */
+        const import_source *s = &sources[i];
+        const int64_t across = (s->width + s->block_columns - 1) / s->block_columns;
+        const int64_t bytes =
+            across * s->block_columns * s->block_rows * (GDALGetDataTypeSizeBytes(s->type) + (s->has_mask ? 1 : 0));
+        changes[2 * i] = (change){mosaic->row[i] - strip_rows + 1, bytes};
+        changes[2 * i + 1] = (change){mosaic->row[i] + s->height, -bytes};
+    }
+    qsort(changes, 2 * (size_t)count, sizeof *changes, by_row);
+    int64_t most = 0, bytes = 0;
+    for (int i = 0; i < 2 * count; i++) {
+        bytes += changes[i].bytes;
         if (bytes > most) most = bytes;
     }
+    free(changes);
     return most;
 }
 
@@ -213,12 +268,18 @@ bool import_reading_open(const import_job *job, const import_source *sources, in
     widest(sources, count, strip_rows, &samples, &masked);
     import_reading *r = *reading = calloc(1, sizeof *r);
     if (r) {
-        *r = (import_reading){.job = job, .sources = sources, .count = count, .mosaic = mosaic};
+        *r = (import_reading){.job = job,
+                              .sources = sources,
+                              .count = count,
+                              .mosaic = mosaic,
+                              .most_open = import_reading_most_open()};
+        r->owner = malloc((size_t)mosaic->lattice.width * (size_t)strip_rows * sizeof *r->owner);
         r->dataset = calloc((size_t)count, sizeof(GDALDatasetH));
+        /* NOLINTNEXTLINE(clang-analyzer-optin.portability.UnixAPI): a source has samples */
         r->rows = malloc(samples * import_kind_bytes(mosaic->kind));
         r->mask = malloc(masked ? masked : 1);
     }
-    return (r && r->dataset && r->rows && r->mask) || import_no_memory(job, "reading the sources");
+    return (r && r->dataset && r->rows && r->mask && r->owner) || import_no_memory(job, "reading the sources");
 }
 
 static void shut(import_reading *r, int source) {
@@ -234,6 +295,8 @@ void import_reading_close(import_reading *r) {
     free(r->dataset);
     free(r->rows);
     free(r->mask);
+    free(r->owner);
+    import_conflicts_free(&r->conflicts);
     free(r);
 }
 
@@ -296,7 +359,13 @@ static bool read_merging(import_reading *r, int source, int32_t top, int32_t row
     const import_source *s = &r->sources[source];
     GDALRasterBandH band = GDALGetRasterBand(r->dataset[source], 1);
     const size_t element = import_kind_bytes(strip->kind);
-    merge m = {.grid = strip, .source = s, .voids = voids_of(s, r->job->options), .unit = import_source_unit(s)};
+    merge m = {.grid = strip,
+               .source = s,
+               .voids = voids_of(s, r->job->options),
+               .unit = import_source_unit(s),
+               .index = source,
+               .owner = r->owner,
+               .conflicts = &r->conflicts};
     m.factor = rqt_unit_factor(&m.unit);
     m.scaled = m.factor != 1 || m.unit.offset != 0;
     m.forward = s->flip_columns ? -1 : 1;
@@ -319,7 +388,7 @@ static bool read_merging(import_reading *r, int source, int32_t top, int32_t row
                                  "say --nodata inf (or -inf)",
                                  s->path, infinite, top + y);
     }
-    return true;
+    return !m.failed || import_no_memory(r->job, "comparing the sources");
 }
 
 /* Bits of the merge -> 0 and 1, and the counts. */
@@ -346,7 +415,7 @@ static bool is_direct(const import_reading *r, int source, const import_strip *s
 }
 
 /* What the strip wants of one source. */
-static bool merge_source(import_reading *r, int source, import_strip *strip) {
+static bool merge_source(import_reading *r, int source, import_strip *strip, import_counts *counts) {
     const import_source *s = &r->sources[source];
     const int32_t row = r->mosaic->row[source];
     const int32_t from = row > strip->first_row ? row : strip->first_row;
@@ -355,19 +424,27 @@ static bool merge_source(import_reading *r, int source, import_strip *strip) {
     const int32_t top = s->flip_rows ? row + s->height - to : from - row;
     if (!opened(r, source) || !read_merging(r, source, top, to - from, strip, from - strip->first_row))
         return false;
-    if (to == row + s->height || r->open > MOST_OPEN) shut(r, source);
+    counts->samples += (int64_t)(to - from) * s->width;
+    if (to == row + s->height || r->open > r->most_open) shut(r, source);
     return true;
 }
 
+const import_conflicts *import_reading_conflicts(const import_reading *r) {
+    return &r->conflicts;
+}
+
 bool import_reading_strip(import_reading *r, import_strip *strip, import_counts *counts) {
+    import_conflicts_clear(&r->conflicts);
     if (is_direct(r, 0, strip)) {
         const int64_t found = opened(r, 0) ? read_directly(r, 0, strip) : -1;
-        if (found >= 0) counts->voids += found;
-        return found >= 0;
+        if (found < 0) return false;
+        counts->voids += found;
+        counts->samples += (int64_t)strip->rows * strip->width;
+        return true;
     }
     memset(strip->valid, 0, (size_t)strip->rows * (size_t)strip->width);
     for (int i = 0; i < r->count; i++)
-        if (!merge_source(r, i, strip)) return false;
+        if (!merge_source(r, i, strip, counts)) return false;
     settle(strip, counts);
     return true;
 }

@@ -2,7 +2,7 @@
  *
  * Reading waits for the disk and decompresses on one core, while the pool works on what was read before. The strips
  * are a ring, or windows of the whole grid when that is kept. GDAL's datasets belong to this thread alone, and so
- * does its list of error handlers.
+ * do its list of error handlers and the resume file.
  */
 #include "source.h"
 
@@ -49,6 +49,26 @@ static import_strip strip_of(const import_reader *r, int32_t number) {
     return s;
 }
 
+/* A strip, from the resume file if it has it, else from the sources. */
+static bool fetch(import_reader *r, int32_t n, import_strip *strip) {
+    import_spool *spool = r->options.spool;
+    if (spool && n < import_spool_strips(spool) &&
+        import_spool_read(spool, n, strip, &r->counts, r->options.conflicts))
+        return true;
+    import_counts own = {0};
+    if (!import_reading_strip(r->reading, strip, &own)) return false;
+    const import_conflicts *conflicts = import_reading_conflicts(r->reading);
+    if (spool && !import_spool_append(&r->own, spool, strip, &own, conflicts)) return false;
+    for (size_t i = 0; r->options.conflicts && i < conflicts->count; i++)
+        if (!import_conflicts_add(r->options.conflicts, &conflicts->pair[i]))
+            return import_no_memory(&r->own, "comparing the sources");
+    r->counts.voids += own.voids;
+    r->counts.overlap += own.overlap;
+    r->counts.overlap_differs += own.overlap_differs;
+    r->counts.samples += own.samples;
+    return true;
+}
+
 static void *read_all(void *context) {
     import_reader *r = context;
     CPLPushErrorHandler(CPLQuietErrorHandler);
@@ -61,7 +81,7 @@ static void *read_all(void *context) {
         pthread_mutex_unlock(&r->lock);
         if (stop) break;
         import_strip strip = strip_of(r, n);
-        ok = import_reading_strip(r->reading, &strip, &r->counts);
+        ok = fetch(r, n, &strip);
         pthread_mutex_lock(&r->lock);
         r->read += ok;
         r->failed = !ok;

@@ -207,16 +207,31 @@ static void describe_voids(GDALRasterBandH band, import_source *s) {
     s->has_mask = !(flags & (GMF_ALL_VALID | GMF_NODATA));
 }
 
-/* The database that is written must not be read at the same time: is it a file of this dataset? */
-static bool is_database(const import_job *job, GDALDatasetH dataset, const char *path) {
+/* The files of a dataset, and what opened it (the member of an archive): is the database, which is written, among
+ * those that are read? And a hash of their sizes and times. */
+static bool look_at_files(const import_job *job, GDALDatasetH dataset, import_source *s) {
     struct stat database, file;
-    if (stat(job->database, &database)) return false;
-    bool same = !stat(path, &file) && file.st_dev == database.st_dev && file.st_ino == database.st_ino;
+    const bool there = !stat(job->database, &database);
+    bool same = false;
     char **files = GDALGetFileList(dataset);
-    for (char **name = files; name && *name && !same; name++)
-        same = !stat(*name, &file) && file.st_dev == database.st_dev && file.st_ino == database.st_ino;
+    files = CSLAddString(files, s->path);
+    files = CSLAddString(files, s->opened);
+    for (char **name = files; name && *name; name++) {
+        VSIStatBufL any;
+        int64_t facts[3] = {0};
+        if (!stat(*name, &file)) {
+            same = same || (there && file.st_dev == database.st_dev && file.st_ino == database.st_ino);
+            facts[0] = file.st_size;
+            facts[1] = file.st_mtim.tv_sec;
+            facts[2] = file.st_mtim.tv_nsec;
+        } else if (!VSIStatL(*name, &any)) {
+            facts[0] = (int64_t)any.st_size;
+            facts[1] = any.st_mtime;
+        }
+        s->content = import_mix(import_mix(s->content, *name, strlen(*name)), facts, sizeof facts);
+    }
     CSLDestroy(files);
-    return same;
+    return !same;
 }
 
 bool import_source_describe(const import_job *job, const char *path, import_source *s) {
@@ -228,7 +243,7 @@ bool import_source_describe(const import_job *job, const char *path, import_sour
     int bands = GDALGetRasterCount(dataset);
     if (!s->base) {
         import_no_memory(job, "describing a source");
-    } else if (is_database(job, dataset, path)) {
+    } else if (!look_at_files(job, dataset, s)) {
         import_refuse(job, "%s is part of the source %s and cannot be the database too", job->database, path);
     } else if (bands == 0) {
         bool parts = GDALGetMetadata(dataset, "SUBDATASETS") != NULL;
@@ -257,8 +272,16 @@ bool import_source_describe(const import_job *job, const char *path, import_sour
 void import_source_free(import_source *s) {
     free(s->opened);
     free(s->base);
-    if (s->crs) OSRDestroySpatialReference(s->crs);
+    if (s->crs) OSRRelease(s->crs);
     *s = (import_source){0};
+}
+
+void import_source_share_crs(import_source *s, const import_source *other) {
+    static const char *const how[] = {"CRITERION=STRICT", NULL};
+    if (!s->crs || !other->crs || s->crs == other->crs || !OSRIsSameEx(s->crs, other->crs, how)) return;
+    OSRRelease(s->crs);
+    s->crs = other->crs;
+    OSRReference(s->crs);
 }
 
 rqt_unit import_source_unit(const import_source *s) {

@@ -28,12 +28,41 @@ typedef struct import_source {
     double nodata;
     int64_t nodata_integer; /* the same for integer bands */
     bool has_mask;          /* a mask band beside nodata */
+    uint64_t content;       /* a hash of size and time of its files: has it changed? */
 } import_source;
 
 bool import_source_describe(const import_job *job, const char *path, import_source *source);
 void import_source_free(import_source *source);
+/* Thousands of tiles have one CRS: keep it once. */
+void import_source_share_crs(import_source *source, const import_source *other);
 /* Metres of a raw value: raw * factor + offset, as rqt_unit_metres has it for z0 = 0, d = 1. */
 rqt_unit import_source_unit(const import_source *source);
+
+/* ------------------------------------------------------------------------------------------------ sources.c --
+ * The rasters behind what the user named. */
+typedef struct import_path {
+    char *path;
+    int32_t argument; /* the name that it comes from */
+    int32_t line;     /* of the list that it stands in; 0: none */
+    bool found;       /* in a folder: it was not named, so what is no terrain is passed over */
+    bool passed;      /* and it was */
+} import_path;
+typedef struct import_paths {
+    const char *const *argument;
+    int arguments;
+    import_path *path;
+    int count;
+    size_t room;
+    int64_t passed; /* files in folders that are no rasters */
+} import_paths;
+
+bool import_paths_find(const import_job *job, const char *const *arguments, int count, import_paths *paths);
+/* The sentence about a source that stands in a list, with its line before it. */
+void import_paths_place_sentence(const import_job *job, const import_paths *paths, const import_path *path);
+void import_paths_free(import_paths *paths);
+bool import_is_folder(const char *path);
+/* The last part of a path, without slashes at its end: for the terrain's name. free(). NULL: out of memory */
+char *import_base_of(const char *argument);
 
 /* ---------------------------------------------------------------------------------------------------- crs.c -- */
 typedef struct import_crs {
@@ -64,6 +93,55 @@ typedef struct import_mosaic {
 
 bool import_mosaic_plan(const import_job *job, const import_source *sources, int count, import_mosaic *mosaic);
 void import_mosaic_free(import_mosaic *mosaic);
+/* The cell of the first source's grid at which another one begins, in x or in y; refused unless it shares the grid.
+ */
+bool import_mosaic_align(const import_job *job, const import_source *first, const import_source *s, bool rows,
+                         int64_t *cell);
+
+/* -------------------------------------------------------------------------------------------------- cover.c -- */
+typedef struct import_window { /* of samples, both ends included */
+    int32_t column0, row0, column1, row1;
+} import_window;
+int64_t import_window_samples(const import_window *window);
+
+typedef struct import_gap {
+    import_window window;
+    size_t hole; /* while they are looked for: one of those that it touches */
+    bool inside; /* the hole that it is part of does not reach the edge */
+} import_gap;
+
+typedef struct import_overlap {
+    int32_t a, b; /* a < b */
+    import_window window;
+} import_overlap;
+
+/* The worst first. */
+typedef struct import_cover {
+    import_gap *gap; /* rectangles that do not overlap, and leave nothing out */
+    size_t gaps;
+    import_overlap *overlap; /* pairs that share at least 2 x 2 samples */
+    size_t overlaps;
+} import_cover;
+
+bool import_cover_find(const import_job *job, const import_source *sources, int count, const import_mosaic *mosaic,
+                       import_cover *cover);
+void import_cover_free(import_cover *cover);
+
+/* ------------------------------------------------------------------------------------------------- report.c -- */
+typedef struct import_findings {
+    const import_source *sources;
+    int count;
+    const import_mosaic *mosaic;
+    const import_crs *crs;
+    const import_cover *cover;
+    import_conflicts *conflicts;
+    const import_report *report;
+} import_findings;
+
+/* The worst of each kind, as sentences. Puts the conflicts into the order of the report. */
+void import_findings_tell(const import_job *job, const import_findings *findings);
+/* All of them into options->report. */
+bool import_findings_write(const import_job *job, const import_findings *findings);
 
 /* --------------------------------------------------------------------------------------------------- read.c -- */
 typedef struct import_reading import_reading;
@@ -75,9 +153,13 @@ void import_reading_close(import_reading *reading);
 /* Rows first_row .. first_row + rows - 1 of the grid into the strip's arrays, from all sources that meet them.
  * Strips come from north to south. Adds to counts. */
 bool import_reading_strip(import_reading *reading, import_strip *strip, import_counts *counts);
+/* Sources that disagree in the strip read last. */
+const import_conflicts *import_reading_conflicts(const import_reading *reading);
+int import_reading_most_open(void); /* datasets that may be open at once */
 /* Bytes of the buffers that reading strips takes beside them, and of the cache in which GDAL keeps each of its
  * blocks until all of its rows have been asked for. */
-size_t import_reading_bytes(const import_source *sources, int count, import_kind kind, int32_t strip_rows);
+size_t import_reading_bytes(const import_source *sources, int count, const import_mosaic *mosaic,
+                            int32_t strip_rows);
 int64_t import_reading_cache(const import_source *sources, int count, const import_mosaic *mosaic,
                              int32_t strip_rows);
 

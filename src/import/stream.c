@@ -29,6 +29,7 @@ typedef struct streaming {
     double quantum;
     pthread_mutex_t lock;
     rqt_status failed;
+    import_fill_reader *filled; /* NULL: nothing is */
     /* the task of the moment */
     rqt_band band;
     int level;
@@ -88,6 +89,7 @@ typedef struct maker {
 static bool keep_block(void *context, rqt_block_number number, const rqt_summary *summary, const rqt_block *block) {
     maker *m = context;
     size_t size;
+    /* NOLINTNEXTLINE(clang-analyzer-core.NullDereference): every worker has its tools */
     m->failed = rqt_block_encode(m->tools->codec, block, m->w->quantum, m->tools->bytes, &size);
     return m->failed == RQT_OK && import_stage_put(m->w->s->stage, number, summary, m->tools->bytes, size);
 }
@@ -145,6 +147,10 @@ static bool put_heights(streaming *w, int32_t first, int32_t count, int32_t *q, 
         w->q = q + (size_t)(y - first) * width;
         w->valid = valid ? valid + (size_t)(y - first) * width : NULL;
         import_pool_run(s->pool, put_rows, w, (w->rows + ROWS_PER_ITEM - 1) / ROWS_PER_ITEM);
+        for (int32_t i = 0; w->filled && i < w->rows; i++)
+            if (!import_fill_apply(w->job, w->filled, y + i, w->q + (size_t)i * width,
+                                   w->valid ? w->valid + (size_t)i * width : NULL))
+                return false;
         if (s->all || w->from + w->rows < w->strip->rows) continue;
         w->strip = NULL;
         import_reader_release(s->reader);
@@ -234,7 +240,7 @@ static bool create_sweep(const import_job *job, import_stream *s) {
         status = rqt_build_create(&s->lattice, s->k, plan.b, &file, import_allocator(), &s->build);
     if (status == RQT_NO_MEMORY) return import_no_memory(job, "computing errors");
     if (status != RQT_OK) return import_refuse(job, "errors cannot be computed (status %d)", (int)status);
-    return import_coarse_give(job, s->coarse, &s->heights->steps, s->has_voids, s->sweep);
+    return import_coarse_give(job, s->coarse, &s->heights->steps, s->has_voids, s->fill, s->sweep);
 }
 
 static bool create_tools(streaming *w, int workers) {
@@ -266,8 +272,10 @@ bool import_stream_run(const import_job *job, import_stream *s) {
     const int workers = import_pool_workers(s->pool);
     pthread_mutex_init(&w.lock, NULL);
     bool ok = import_stage_create(job, &s->lattice, s->k, s->plan->stage, &s->stage) && create_tools(&w, workers);
+    if (ok && s->fill) ok = import_fill_reader_create(job, s->fill, &w.filled);
     if (ok) ok = s->lattice.K == 0 ? only_corners(&w) : create_sweep(job, s) && stream_bands(&w);
     free_tools(&w, workers);
+    import_fill_reader_free(w.filled);
     pthread_mutex_destroy(&w.lock);
     return ok;
 }

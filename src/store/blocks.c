@@ -35,6 +35,16 @@ int store_block_bytes(store *s, const store_terrain *t, rqt_block_number number,
     return store_fail(error, SQLITE_CORRUPT_VTAB, "terrain %s is damaged: block %llu is missing", t->name, number);
 }
 
+static kept_summary *place_of(store *s, uint64_t key, rqt_block_number number) {
+    return &s->summaries[(number ^ key * 2654435761U) % SUMMARY_PLACES];
+}
+
+void store_forget_block(store *s, const store_terrain *t, rqt_block_number number) {
+    const uint64_t key = (uint64_t)(t - s->terrains);
+    block_cache_forget(s->cache, key, number);
+    if (s->summaries) place_of(s, key, number)->terrain = 0;
+}
+
 int store_get_summary(store *s, const store_terrain *t, rqt_block_number number, const rqt_summary **summary,
                       char **error) {
     const uint64_t key = (uint64_t)(t - s->terrains);
@@ -45,7 +55,7 @@ int store_get_summary(store *s, const store_terrain *t, rqt_block_number number,
         if (!s->summaries) return SQLITE_NOMEM;
         memset(s->summaries, 0, bytes);
     }
-    kept_summary *kept = &s->summaries[(number ^ key * 2654435761U) % SUMMARY_PLACES];
+    kept_summary *kept = place_of(s, key, number);
     if (kept->terrain == key + 1 && kept->number == number) {
         *summary = &kept->summary;
         return SQLITE_OK;
@@ -163,6 +173,7 @@ static int window(store *s, const store_terrain *t, int32_t col, int32_t row, in
                     if (x < col || x >= col + width || x >= t->lattice.width) continue;
                     const size_t to = (size_t)(y - row) * (size_t)width + (size_t)(x - col);
                     const size_t from = (size_t)v * (size_t)n + (size_t)u;
+                    /* NOLINTNEXTLINE(clang-analyzer-core.NullDereference): a block, or a code */
                     q[to] = block->q[from];
                     valid[to] = block->flags[from] & RQT_VALID;
                 }

@@ -17,7 +17,6 @@
 
 #include "cache.h"
 
-#include <math.h>
 #include <string.h>
 
 #define CACHE_BYTES ((size_t)16 << 20)
@@ -642,7 +641,7 @@ int store_check(store *s, const store_terrain *t, bool (*tell_one)(void *context
                 void *context, char **error) {
     check c = {.db = store_connection(s),
                .t = t,
-               .quantum = fabs(rqt_unit_factor(&t->unit)) / t->unit.d,
+               .quantum = store_quantum(t),
                .samples_known = true,
                .min_q = INT32_MAX,
                .max_q = INT32_MIN,
@@ -675,6 +674,7 @@ int store_check(store *s, const store_terrain *t, bool (*tell_one)(void *context
     if (c.row && !ended(&c)) visit(&c, 0, 0, 0);
     if (c.row && !ended(&c)) check_tables(&c);
     destroy(&c);
+    if (!ended(&c)) c.code = store_check_fill(s, t, tell_one, context, error);
     if (!ended(&c)) c.code = store_check_minimal(s, t, tell_one, context, error);
     return c.code;
 }

@@ -96,12 +96,37 @@ int64_t store_count_selected(const rqt_query *query, rqt_block_number number, co
 #define STORE_MINIMAL "_minimal" /* suffix of the tables that hold minimal errors */
 /* A writer of those tables, beside a terrain of main that is complete. writer.c */
 int store_writer_beside(sqlite3 *db, const store_terrain *t, store_writer **writer, char **error);
+/* The row of a block in the index, bound to ?1 .. ?9. Does it answer anything? Else it has no row. writer.c */
+bool store_bind_index(sqlite3_stmt *s, const rqt_lattice *lattice, const rqt_block_place *place,
+                      rqt_block_number number, const rqt_summary *summary);
+/* Changes to a terrain of main that is there. amend.c */
+typedef struct store_amender store_amender;
+int store_amend_begin(sqlite3 *db, const store_terrain *t, store_amender **amender, char **error);
+/* Another summary, and other bytes unless NULL, for a block; its row in the index likewise. */
+int store_amend_block(store_amender *a, rqt_block_number number, const rqt_summary *before,
+                      const rqt_summary *after, const uint8_t *bytes, size_t size, char **error);
+/* Samples of a window that are not kept are no longer filled ones (rqt_fill_N, where there is one). */
+int store_amend_filled(store_amender *a, int32_t col, int32_t row, int32_t width, int32_t height,
+                       const uint8_t *state, char **error);
+/* The terrain's row, when all changes are made. */
+int store_amend_terrain(store_amender *a, const rqt_statistics *statistics, const char *source, char **error);
+void store_amend_free(store_amender *a);
+/* The tables of its minimal errors, which are there. */
+int store_drop_minimal(sqlite3 *db, int64_t id, char **error);
+/* |f|/d: metres of a height quantum. terrain.c */
+double store_quantum(const store_terrain *t);
+/* Forget what is kept of a block that has changed. blocks.c */
+void store_forget_block(store *s, const store_terrain *t, rqt_block_number number);
 /* The pyramid over a metric's errors, computed now if need be; valid until the store forgets. methods.c */
 int store_take_pyramid(store *s, const store_terrain *t, rqt_metric metric, rqt_outline outline,
                        const rqt_pyramid **pyramid, char **error);
 /* What rqt_check finds of the minimal errors of a terrain, as store_check. minimal.c */
 int store_check_minimal(store *s, const store_terrain *t, bool (*tell)(void *context, const store_finding *finding),
                         void *context, char **error);
+/* Does it have the table of what was filled? The same check of that. fill.c */
+bool store_has_fill(sqlite3 *db, const store_terrain *t);
+int store_check_fill(store *s, const store_terrain *t, bool (*tell)(void *context, const store_finding *finding),
+                     void *context, char **error);
 /* The terrain as the tables of its minimal errors have it; NULL when it has none. minimal.c */
 const store_terrain *store_minimal(store *s, const store_terrain *t);
 

@@ -9,7 +9,6 @@
  */
 #include "internal.h"
 
-#include <math.h>
 #include <string.h>
 
 static bool has_table(sqlite3 *db, const store_terrain *t) {
@@ -21,10 +20,6 @@ static bool has_table(sqlite3 *db, const store_terrain *t) {
 const store_terrain *store_minimal(store *s, const store_terrain *t) {
     const int n = (int)(t - s->terrains);
     return n < s->count && has_table(s->db, t) ? &s->terrains[s->count + n] : NULL;
-}
-
-static double quantum_of(const store_terrain *t) {
-    return fabs(rqt_unit_factor(&t->unit)) / t->unit.d;
 }
 
 /* ----------------------------------------------------------------------------------------------- writing */
@@ -63,7 +58,7 @@ static int write_all(sqlite3 *db, const store_terrain *t, const rqt_pyramid *pyr
         rqt_block_number number;
         rqt_summary summary;
         rqt_pyramid_block(pyramid, n, &number, &summary, &w->block);
-        code = store_fail_core(error, rqt_block_encode(w->codec, &w->block, quantum_of(t), w->bytes, &w->size),
+        code = store_fail_core(error, rqt_block_encode(w->codec, &w->block, store_quantum(t), w->bytes, &w->size),
                                "encoding a block");
         if (code == SQLITE_OK) code = store_writer_block(writer, number, &summary, w->bytes, w->size, error);
         if (code == SQLITE_OK && progress && !progress(context, (double)(n + 1) / (double)count))
@@ -143,7 +138,7 @@ static int first_difference(const rqt_block *a, const rqt_block *b) {
 /* The stored bytes against the block that the heights give, which is in shop.block. */
 static int check_bytes(check *c, rqt_block_number number, const uint8_t *bytes, size_t size) {
     workshop *w = &c->shop;
-    const rqt_status status = rqt_block_encode(w->codec, &w->block, quantum_of(c->t), w->bytes, &w->size);
+    const rqt_status status = rqt_block_encode(w->codec, &w->block, store_quantum(c->t), w->bytes, &w->size);
     if (status != RQT_OK) return store_fail_core(c->error, status, "encoding a block");
     if (size == w->size && memcmp(bytes, w->bytes, size) == 0) return SQLITE_OK;
     rqt_block_header header, expected;

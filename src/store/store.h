@@ -118,6 +118,10 @@ void store_limit_methods(store *s, size_t bytes);
 /* Full-resolution samples of a window inside the raster, for width*height values each, row by row. */
 int store_window(store *s, const store_terrain *t, int32_t col, int32_t row, int32_t width, int32_t height,
                  int32_t *q, uint8_t *valid, char **error);
+/* Unit normals of the terrain at the vertices of a patch, from the full-resolution samples around each (normals.c
+ * has the definition): x east, y north, z up, three floats a vertex, released with sqlite3_free. Vertices have to
+ * be samples of the raster. */
+int store_normals(store *s, const store_terrain *t, const rqt_patch *patch, float **normals, char **error);
 /* Height in metres at CRS coordinates on the mesh of eps (eps < 0: full resolution). *found = false over void or
  * outside. */
 int store_height(store *s, const store_terrain *t, double x, double y, double eps, double *metres, bool *found,
@@ -133,6 +137,9 @@ typedef struct store_finding {
 int store_check(store *s, const store_terrain *t, bool (*tell)(void *context, const store_finding *finding),
                 void *context, char **error);
 
+/* How many samples of the terrain were no data: [0] STORE_FILLED, [1] STORE_SEA. */
+int store_fill_counts(store *s, const store_terrain *t, int64_t counts[2], char **error);
+
 /* ---------------------------------------------------------------------------------------------- writing */
 /* Create what a new, empty database needs: a GeoPackage (application id, core tables). Harmless on one that is a
  * GeoPackage already; leaves every other database as it is. Inside the caller's transaction. */
@@ -146,10 +153,45 @@ int store_writer_begin(sqlite3 *db, const store_terrain *info, bool replace, sto
 /* One block, in ascending order of number. */
 int store_writer_block(store_writer *w, rqt_block_number number, const rqt_summary *summary, const uint8_t *bytes,
                        size_t size, char **error);
+/* Samples first .. last of a row, which were no data: STORE_FILLED between neighbours, STORE_SEA. Runs come in the
+ * order of rows, and of columns in them. */
+enum { STORE_FILLED = 1, STORE_SEA = 2 };
+int store_writer_fill(store_writer *w, int32_t row, int32_t first, int32_t last, int kind, char **error);
 /* Mark the terrain complete. */
 int store_writer_finish(store_writer *w, rqt_code max_error, char **error);
 /* Release, finished or not. */
 void store_writer_free(store_writer *w);
+
+/* New samples for parts of a terrain of main, inside the caller's write transaction (BEGIN IMMEDIATE), which he
+ * will commit or roll back. What is there afterwards is, in every row and BLOB of its tables and in the statistics
+ * of its row, what an import of the changed raster in the same unit writes; only rows that differ are written.
+ * While it goes on, the connection's other stores see each part as soon as it is done. */
+typedef struct store_update store_update;
+
+enum { STORE_KEEP, STORE_HEIGHT, STORE_VOID }; /* what becomes of a sample */
+
+typedef struct store_update_report {
+    int64_t changed;                  /* samples that are others now */
+    int64_t blocks, summaries, bytes; /* rows written: with their blocks, summary alone; bytes */
+    int64_t blocks_read, bytes_read;  /* blocks that had to be decoded */
+    int64_t measured, cells;          /* rqt_update_result */
+    bool minimal;                     /* minimal errors were stored, and have been computed anew */
+} store_update_report;
+
+/* name as in store_find. *terrain is as it was; valid until store_update_free. */
+int store_update_begin(sqlite3 *db, const char *name, store_update **update, const store_terrain **terrain,
+                       char **error);
+/* A window inside the raster, width * height values each; q is looked at where the state is STORE_HEIGHT. progress,
+ * when not NULL, gets the share done and returns false to stop (SQLITE_INTERRUPT; the caller rolls back). */
+int store_update_samples(store_update *u, int32_t col, int32_t row, int32_t width, int32_t height, const int32_t *q,
+                         const uint8_t *state, bool (*progress)(void *context, double done), void *context,
+                         char **error);
+/* When all parts are in: the terrain's row, with these names (one a line) put behind those of its sources that it
+ * had from elsewhere, and the stored minimal errors, if there are any. Nothing has changed: nothing is written. */
+int store_update_finish(store_update *u, const char *sources, bool (*progress)(void *context, double done),
+                        void *context, char **error);
+const store_update_report *store_update_told(const store_update *u);
+void store_update_free(store_update *u);
 
 /* Store the minimal errors of a terrain of main that is complete, so that queries need not compute them: in tables
  * like its own (FORMAT.md, "Tables"), inside the caller's transaction. All heights are read back: what that takes

@@ -196,6 +196,10 @@ static int read_schema(sqlite3 *db, const char *schema, store_terrain **terrains
     return code;
 }
 
+double store_quantum(const store_terrain *t) {
+    return fabs(rqt_unit_factor(&t->unit)) / t->unit.d;
+}
+
 int store_read_terrains(sqlite3 *db, store_terrain **terrains, int *count, char **error) {
     *terrains = NULL;
     *count = 0;

@@ -16,7 +16,7 @@ struct store_writer {
     int k;
     rqt_lattice lattice;
     int64_t blocks, bytes;
-    sqlite3_stmt *put_block, *put_index;
+    sqlite3_stmt *put_block, *put_index, *put_fill; /* the last from the first run on */
 };
 
 /* Several statements, one after the other. */
@@ -67,12 +67,12 @@ static int drop_terrain(sqlite3 *db, int64_t id, char **error) {
     char *sql =
         sqlite3_mprintf("DROP TABLE IF EXISTS main.rqt_index_%lld; DROP TABLE IF EXISTS main.rqt_block_%lld; "
                         "DROP TABLE IF EXISTS main.rqt_index_%lld%s; DROP TABLE IF EXISTS main.rqt_block_%lld%s; "
-                        "DELETE FROM main.rqt_terrain WHERE id = %lld;",
-                        id, id, id, STORE_MINIMAL, id, STORE_MINIMAL, id);
+                        "DROP TABLE IF EXISTS main.rqt_fill_%lld; DELETE FROM main.rqt_terrain WHERE id = %lld;",
+                        id, id, id, STORE_MINIMAL, id, STORE_MINIMAL, id, id);
     char *contents = has_table(db, "gpkg_contents")
                          ? sqlite3_mprintf("DELETE FROM main.gpkg_contents WHERE table_name IN "
-                                           "('rqt_block_%lld', 'rqt_block_%lld%s')",
-                                           id, id, STORE_MINIMAL)
+                                           "('rqt_block_%lld', 'rqt_block_%lld%s', 'rqt_fill_%lld')",
+                                           id, id, STORE_MINIMAL, id)
                          : sqlite3_mprintf("");
     int code = sql && contents ? run(db, sql, error, "replacing a terrain") : SQLITE_NOMEM;
     if (code == SQLITE_OK) code = run(db, contents, error, "replacing a terrain");
@@ -176,6 +176,18 @@ static bool put_interval(sqlite3_stmt *s, int at, rqt_interval interval) {
     return answers;
 }
 
+bool store_bind_index(sqlite3_stmt *s, const rqt_lattice *lattice, const rqt_block_place *place,
+                      rqt_block_number number, const rqt_summary *summary) {
+    const int32_t last_x = lattice->width - 1, last_y = lattice->height - 1;
+    sqlite3_bind_int64(s, 1, (sqlite3_int64)number);
+    sqlite3_bind_int(s, 2, place->x);
+    sqlite3_bind_int(s, 3, place->x + place->side < last_x ? place->x + place->side : last_x);
+    sqlite3_bind_int(s, 4, place->y);
+    sqlite3_bind_int(s, 5, place->y + place->side < last_y ? place->y + place->side : last_y);
+    const bool tol = put_interval(s, 6, summary->tol), exact = put_interval(s, 8, summary->exact);
+    return tol || exact;
+}
+
 int store_writer_block(store_writer *w, rqt_block_number number, const rqt_summary *summary, const uint8_t *bytes,
                        size_t size, char **error) {
     rqt_block_place place;
@@ -195,17 +207,35 @@ int store_writer_block(store_writer *w, rqt_block_number number, const rqt_summa
     w->bytes += (int64_t)size + RQT_SUMMARY_BYTES;
 
     s = w->put_index;
-    const int32_t last_x = w->lattice.width - 1, last_y = w->lattice.height - 1;
-    sqlite3_bind_int64(s, 1, (sqlite3_int64)number);
-    sqlite3_bind_int(s, 2, place.x);
-    sqlite3_bind_int(s, 3, place.x + place.side < last_x ? place.x + place.side : last_x);
-    sqlite3_bind_int(s, 4, place.y);
-    sqlite3_bind_int(s, 5, place.y + place.side < last_y ? place.y + place.side : last_y);
-    const bool tol = put_interval(s, 6, summary->tol), exact = put_interval(s, 8, summary->exact);
-    if (!tol && !exact) return SQLITE_OK;
+    if (!store_bind_index(s, &w->lattice, &place, number, summary)) return SQLITE_OK;
     sqlite3_step(s);
     code = sqlite3_reset(s);
     return code == SQLITE_OK ? SQLITE_OK : store_fail_db(error, w->db, code, "writing the index");
+}
+
+/* Its table, when there is something to write into it. */
+static int begin_fill(store_writer *w, char **error) {
+    char *sql = with_id(sql_fill, w->id, ""), *table = sqlite3_mprintf("rqt_fill_%lld", w->id);
+    int code = sql && table ? run(w->db, sql, error, "creating the table of filled samples") : SQLITE_NOMEM;
+    if (code == SQLITE_OK) code = register_attributes(w->db, table, table, "rqt: samples that were no data", error);
+    if (code == SQLITE_OK)
+        code = prepare(w, &w->put_fill,
+                       "INSERT INTO main.rqt_fill_%lld%s(row, col0, col1, kind) VALUES(?1, ?2, ?3, ?4)", error);
+    sqlite3_free(sql);
+    sqlite3_free(table);
+    return code;
+}
+
+int store_writer_fill(store_writer *w, int32_t row, int32_t first, int32_t last, int kind, char **error) {
+    int code = w->put_fill ? SQLITE_OK : begin_fill(w, error);
+    if (code != SQLITE_OK) return code;
+    sqlite3_bind_int(w->put_fill, 1, row);
+    sqlite3_bind_int(w->put_fill, 2, first);
+    sqlite3_bind_int(w->put_fill, 3, last);
+    sqlite3_bind_int(w->put_fill, 4, kind);
+    sqlite3_step(w->put_fill);
+    code = sqlite3_reset(w->put_fill);
+    return code == SQLITE_OK ? SQLITE_OK : store_fail_db(error, w->db, code, "writing what was filled");
 }
 
 int store_writer_finish(store_writer *w, rqt_code max_error, char **error) {
@@ -223,5 +253,6 @@ void store_writer_free(store_writer *w) {
     if (!w) return;
     sqlite3_finalize(w->put_block);
     sqlite3_finalize(w->put_index);
+    sqlite3_finalize(w->put_fill);
     sqlite3_free(w);
 }

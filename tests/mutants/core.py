@@ -14,7 +14,7 @@ MUTANTS = [
     ("bound: the end of a row is left out", "src/core/error_kernels_rows.h", "if (x < end) {", "if (false) {",
      "test_core_lattice", "errors_equal_the_oracles_on_adversarial_surfaces"),
     ("bound: the plane tilts the wrong way", "src/core/deviation.c", "        if (a.y == box->y0) gy = -gy;\n", "",
-     "test_core_lattice", "a_plane_has_no_error_anywhere"),
+     "test_core_lattice", "F2_planes_of_odd_slopes_have_no_error_anywhere"),
     ("bound: clamped triangles taken for nested", "src/core/deviation.c",
      "if (!is_clamped(s, &t->t)) {", "if (true) {",
      "test_core_lattice", "errors_equal_the_oracles_for_every_small_extent"),
@@ -42,7 +42,7 @@ MUTANTS = [
      "                most.center &= sound;\n", "",
      "test_core_lattice", "errors_equal_the_oracles_for_every_small_extent"),
     ("rounding: down instead of up", "src/core/code.c", "(((int64_t)1 << DROPPED) - 1)", "0",
-     "test_core_codes", "errors_in_quanta_round_up_only_next_to_every_code"),
+     "test_core_codes", "F45_errors_in_quanta_round_up_only_next_to_every_code"),
     # the closure
     ("closure: saturation misses two children", "src/core/saturate.c", "if (most > *c) *c = most;", "if (ab > *c) *c = ab;",
      "test_core_lattice", "errors_equal_the_oracles_for_every_small_extent"),
@@ -112,7 +112,7 @@ MUTANTS = [
      "test_store", "a_height_is_the_one_of_the_patch_of_the_point"),
     # the winding
     ("winding: strips do not turn", "src/core/strip.c", "s[count++] = even ? b : c;\n    s[count++] = even ? c : b;",
-     "s[count++] = b;\n    s[count++] = c;", "test_core_strip", "strips_of_patches_are_the_patches"),
+     "s[count++] = b;\n    s[count++] = c;", "test_core_strip", "F39_strips_of_patches_are_the_patches"),
     ("winding: triangles do not turn with depth", "src/core/walk.c",
      "swap = (l ^ r) & (0 - (turn ^ (c.splits & 1)));", "swap = (l ^ r) & (0 - turn);",
      "test_core_query", "queries_equal_the_global_walk_on_small_rasters"),

@@ -5,7 +5,7 @@ MUTANTS = [
     ("import: south-up rasters upside down", "src/import/mosaic.c", "if (!(off <= SLACK))", "if (false)",
      "test_import_faults", "sources_of_unlike_grids_are_refused"),
     ("import: heights far from zero", "src/import/quantise.c", "(int64_t)middle", "(int64_t)0",
-     "test_import", "heights_far_from_zero_lose_nothing"),
+     "test_import", "F10_millimetres_far_from_zero_are_not_lost"),
     ("import: voids of the first band everywhere", "src/import/stream.c",
      "if (w->valid) memcpy(w->valid + to, w->strip->valid + at, width);",
      "if (w->valid) memcpy(w->valid + to, w->strip->valid + (size_t)y * width, width);",

@@ -1,0 +1,147 @@
+/* command_update.c - rqt update: options, progress and the report around import_update. */
+#include "cli.h"
+#include "import.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+static const char HELP[] =
+    "rqt update: rasters replace a part of a terrain\n"
+    "\n"
+    "Usage: rqt update [OPTION...] SOURCE... DATABASE\n"
+    "\n"
+    "SOURCE is whatever GDAL reads. It has the terrain's CRS and lies on its grid: the same cells, a whole number "
+    "of\n"
+    "them away. What lies outside the terrain is left out. Where its samples are void the terrain keeps what it "
+    "has.\n"
+    "Several sources are put in one after the other: a later one wins.\n"
+    "\n"
+    "Heights are kept in the terrain's unit and steps. Where the terrain holds its heights without rounding, one "
+    "that\n"
+    "would have to be rounded is refused.\n"
+    "\n"
+    "Everything is one transaction: others see the terrain as it was or as it is then, and an update that fails or "
+    "is\n"
+    "stopped leaves it as it was. The result is that of an import of the changed raster, in every block; only "
+    "what\n"
+    "changes is written. To undo an update, update from the old raster (with --voids, if voids have been filled).\n"
+    "For more than about a tenth of a terrain, rqt import --replace of the whole is faster.\n"
+    "\n"
+    "Options:\n"
+    "  --terrain T     the terrain (default: the only one)\n"
+    "  --voids         void samples of a source make voids\n"
+    "  --nodata V      samples of this value are voids, too\n"
+    "  --unit U        unit of the heights: m, ft, us-ft or a number of metres (default: what the raster says)\n"
+    "  --help          this text\n"
+    "\n"
+    "Examples:\n"
+    "  rqt update landslide.tif county.gpkg\n"
+    "  rqt update --terrain lidar --nodata -9999 flight-17.tif flight-18.tif county.gpkg\n"
+    "  gdal_translate -srcwin 100 200 64 64 county.tif old.tif && rqt update --voids old.tif county.gpkg\n";
+
+enum { TERRAIN = 1000, VOIDS, NODATA, UNIT };
+
+static const struct option OPTIONS[] = {{"terrain", required_argument, NULL, TERRAIN},
+                                        {"voids", no_argument, NULL, VOIDS},
+                                        {"nodata", required_argument, NULL, NODATA},
+                                        {"unit", required_argument, NULL, UNIT},
+                                        {"help", no_argument, NULL, 'h'},
+                                        {NULL, 0, NULL, 0}};
+
+/* Set by Ctrl-C (and by a polite kill); the progress callback hands it on, and the update rolls back. */
+static volatile sig_atomic_t stopped;
+
+static void stop(int number) {
+    (void)number;
+    stopped = 1;
+}
+
+static bool on_progress(void *context, const char *stage, double done, int64_t samples) {
+    cli_progress_show(context, stage, done, samples);
+    return !stopped;
+}
+
+static void on_notice(void *context, const char *sentence) {
+    cli_progress_wipe(context);
+    cli_say("%s", sentence);
+}
+
+/* CLI_OK, or CLI_USAGE after a sentence. */
+static int set_option(import_options *o, bool *voids, int option) {
+    double number;
+    switch (option) {
+    case TERRAIN:
+        o->name = optarg;
+        return CLI_OK;
+    case VOIDS:
+        *voids = true;
+        return CLI_OK;
+    case NODATA:
+        if (!cli_number(optarg, &number)) {
+            if (strcasecmp(optarg, "nan")) return cli_usage("--nodata %s is not a number", optarg);
+            number = (double)NAN;
+        }
+        o->has_nodata = true;
+        o->nodata = number;
+        return CLI_OK;
+    case UNIT:
+        if (strcmp(optarg, "m") && strcmp(optarg, "ft") && strcmp(optarg, "us-ft") &&
+            !(cli_number(optarg, &number) && number > 0))
+            return cli_usage("--unit %s: m, ft, us-ft or a number of metres", optarg);
+        o->unit = optarg;
+        return CLI_OK;
+    default:
+        return CLI_USAGE; /* cli_option has said why */
+    }
+}
+
+static void print_report(const import_update_report *r, double seconds) {
+    printf("%s: %s samples put in, %s of them differ\n", r->name, cli_count(r->samples), cli_count(r->changed));
+    if (r->changed == 0) {
+        puts("  nothing written");
+        return;
+    }
+    printf("  %s block%s and %s more summar%s written, %s bytes; %s block%s read, %s bytes\n", cli_count(r->blocks),
+           r->blocks == 1 ? "" : "s", cli_count(r->summaries), r->summaries == 1 ? "y" : "ies", cli_count(r->bytes),
+           cli_count(r->blocks_read), r->blocks_read == 1 ? "" : "s", cli_count(r->bytes_read));
+    printf("  %.3f s (reading %.3f, updating %.3f)\n", seconds, r->seconds_read, r->seconds_update);
+}
+
+static int run(int argc, char **argv) {
+    import_options options;
+    bool voids = false;
+    import_options_init(&options);
+    for (int option; (option = cli_option(argc, argv, "h", OPTIONS)) != -1;) {
+        if (option == 'h') return cli_help(HELP);
+        const int status = set_option(&options, &voids, option);
+        if (status != CLI_OK) return status;
+    }
+    if (argc - optind < 2)
+        return cli_usage(argc == optind ? "a source and a database are missing"
+                                        : "the database is missing: rqt update SOURCE... DATABASE");
+    cli_progress progress;
+    cli_progress_begin(&progress);
+    options.progress = on_progress;
+    options.notice = on_notice;
+    options.context = &progress;
+
+    /* The second Ctrl-C ends the process as usual: SQLite rolls back when the database is next opened. */
+    const struct sigaction action = {.sa_handler = stop, .sa_flags = (int)SA_RESETHAND};
+    sigaction(SIGINT, &action, NULL);
+    sigaction(SIGTERM, &action, NULL);
+    /* A limit on the size of files (ulimit -f) is a full disk, of which we and SQLite know how to tell. */
+    signal(SIGXFSZ, SIG_IGN);
+
+    import_update_report report;
+    char message[2048];
+    const double start = cli_seconds();
+    const int failed = import_update((const char *const *)argv + optind, argc - optind - 1, argv[argc - 1],
+                                     &options, voids, &report, message, sizeof message);
+    cli_progress_wipe(&progress);
+    if (failed) return cli_fail("%s", message);
+    print_report(&report, cli_seconds() - start);
+    return CLI_OK;
+}
+
+const cli_command command_update = {"update", "rasters replace a part of a terrain", run};
