@@ -27,7 +27,11 @@ static void test_obj_text(void **state) {
     rqt_allocator allocator = {heap_resize, &h};
     rqt_patch patch = {
         .vertices = vertices, .vertex_count = 3, .triangles = indices, .triangle_count = 1, .allocator = allocator};
-    format_frame frame = {{600000.5, 200000, 0.25, -0.5}, {400, 100, 1, 1, 1, 0}, 21781, "a\nv 1 2 3", 0.5};
+    format_frame frame = {.placement = {600000.5, 200000, 0.25, -0.5},
+                          .unit = {400, 100, 1, 1, 1, 0},
+                          .srid = 21781,
+                          .title = "a\nv 1 2 3",
+                          .eps = 0.5};
     uint8_t *bytes;
     size_t size;
     assert_int_equal(format_patch(&patch, &frame, FORMAT_OBJ, &allocator, &bytes, &size), RQT_OK);
