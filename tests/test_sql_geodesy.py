@@ -568,6 +568,17 @@ def frames():
                    "AND abs(y) < 1e-3", eps)[0][0], 2)
         slivers = sum(len(set(t)) < 3 for t in polar)
         check("F28 the Earth at %d: no slivers at the poles" % eps, slivers == 0 and polar, slivers)
+    # relief on one side of the seam only: what it asks for there, the other side must have too
+    own = Dice(SEED + 1)
+    for amplitude in (60000, 30000):
+        name = "lopsided%d" % amplitude
+        grid = [[own.below(2 * amplitude) - amplitude if 60 < i < 72 and 0 < j < 36 and (7 * j + i) % 5 == 0 else 0 for i in range(73)]
+                for j in range(37)]
+        import_terrain(path, write_grid(temp(name + ".asc"), grid, x0=-180, y0=-90, cell=5, crs=WGS84), name=name, block=3)
+        for eps in (60000, 120000, 200000):
+            _, _, lone, triangles, vertices, _, _, edges = prove_in_space(db, eps, name, grid, lambda c, r: (c * 5 - 180, 90 - r * 5), 50)
+            equal("F28 relief beside the seam, %s at %d: closed, a sphere" % (name, eps), (lone, vertices - edges // 2 + triangles), (0, 2))
+            check("F28 relief beside the seam, %s at %d: not all of the grid" % (name, eps), vertices < 1500, vertices)
     near_seam = "rqt_bbox(170, -10, -170, 10, 4326)"
     whole = set(rows(db, "SELECT x0,y0,z0,x1,y1,z1,x2,y2,z2 FROM rqt_triangles(NULL, 400, 'globe', '{\"frame\":\"ecef\"}')"))
     east = set(rows(db, "SELECT x0,y0,z0,x1,y1,z1,x2,y2,z2 FROM rqt_triangles(rqt_bbox(170, -10, 180, 10), 400, 'globe', '{\"frame\":\"ecef\"}')"))

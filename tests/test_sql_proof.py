@@ -98,7 +98,7 @@ def prove(title, db, grid):
                 wrong.append((eps, i, j, seen, None))
     equal(title + ": rqt_height at samples is within eps of them, NULL over void", wrong[:3], [])
     x1, y1 = t["x0"] + (t["width"] - 1) * t["dx"], t["y0"] + (t["height"] - 1) * t["dy"]
-    around = abs((t["width"] - 1) * t["dx"]) >= 360 and (t["srid"] == 4326)  # then no longitude is outside
+    around = abs((t["width"] - 1) * t["dx"]) >= 360 and one(db, "SELECT srid FROM rqt_terrains") == 4326  # then no longitude is outside
     outside = [(t["x0"], t["y0"] - t["dy"])] * 2 if around else [(t["x0"] - t["dx"] / 100, t["y0"]), (x1 + t["dx"] / 100, y1)]
     outside += [(t["x0"], t["y0"] - t["dy"] / 100), (x1, y1 + t["dy"] / 100)]
     equal(title + ": rqt_height is NULL outside", [one(db, "SELECT rqt_height(?, ?)", *p) for p in outside], [None] * 4)

@@ -41,7 +41,7 @@ MUTANTS = [
     ("frame: the Earth is flat", "ext/frame.c", "lowering[i] += f->merging;", "lowering[i] = f->merging;",
      SQL, "F29 flat: every sample within"),
     ("frame: the seam is left open", "ext/frame.c", "if (code == SQLITE_OK && f->seam) code = close_seam(r, f, error);", "",
-     SQL, "F28 the Earth at 150: closed at seam and poles"),
+     SQL, "F28 relief beside the seam"),
     ("frame: triangles without area at the poles stay", "ext/frame.c", "if (a == b || b == d || d == a) continue; /* at a pole */", "",
      SQL, "F28 the Earth at 150"),
     ("frame: heights that become one may differ by anything", "ext/frame.c", "if (code == SQLITE_OK && rule_least_eps(r) < f->merging)",
