@@ -155,8 +155,48 @@ bool import_paths_find(const import_job *job, const char *const *arguments, int 
     return ok;
 }
 
-void import_paths_place_sentence(const import_job *job, const import_paths *p, const import_path *path) {
-    place_sentence(job, p->argument[path->argument] + 1, path->line);
+/* A source that was only found in a folder, and is no terrain's: several bands, or none. */
+static bool is_passed_over(const import_job *job, const import_path *path) {
+    if (!path->found) return false;
+    CPLPushErrorHandler(CPLQuietErrorHandler);
+    GDALDatasetH d = GDALOpenEx(path->path, GDAL_OF_RASTER | GDAL_OF_READONLY, NULL, NULL, NULL);
+    int bands = d ? GDALGetRasterCount(d) : -1;
+    if (d) GDALClose(d);
+    /* A GeoPackage of tables, say, is identified and has no raster. */
+    if (!d && (d = GDALOpenEx(path->path, GDAL_OF_VECTOR | GDAL_OF_READONLY, NULL, NULL, NULL)) != NULL) {
+        bands = 0;
+        GDALClose(d);
+    }
+    CPLPopErrorHandler();
+    if (bands < 0 || bands == 1) return false;
+    if (bands)
+        import_notice(job, "%s is passed over: it has %d bands, and a terrain has one", path->path, bands);
+    else
+        import_notice(job, "%s is passed over: it holds no raster", path->path);
+    return true;
+}
+
+bool import_paths_describe(const import_job *job, const import_paths *p, int n, import_source *source) {
+    import_path *path = &p->path[n];
+    if (import_source_describe(job, path->path, source)) return true;
+    import_source_free(source);
+    path->passed = is_passed_over(job, path);
+    if (path->passed)
+        import_refuse(job, "%s", ""); /* it was none */
+    else
+        import_paths_place_sentence(job, p, n);
+    return false;
+}
+
+void import_paths_place_sentence(const import_job *job, const import_paths *p, int n) {
+    const import_path *path = &p->path[n];
+    if (path->line) place_sentence(job, p->argument[path->argument] + 1, path->line);
+}
+
+void import_paths_tell_passed(const import_job *job, const import_paths *p) {
+    if (!p->passed) return;
+    import_notice(job, "%lld file%s in folders %s no raster%s: passed over", (long long)p->passed,
+                  p->passed == 1 ? "" : "s", p->passed == 1 ? "is" : "are", p->passed == 1 ? "" : "s");
 }
 
 void import_paths_free(import_paths *p) {
