@@ -250,6 +250,7 @@ ln -s t.gpkg link.gpkg
 refuses "mesh: the database by another name" 2 "is the database itself" $M --eps 1 -o link.gpkg
 mkdir folder.obj
 refuses "mesh: a folder" 2 "is a folder" $M --eps 1 -o folder.obj
+mkfifo pipe.obj; refuses "mesh: a device" 2 "is a device" $M --eps 1 -o pipe.obj
 refuses "mesh: a folder that is not there" 1 "cannot be written" $M --eps 1 -o nowhere/a.obj
 for kind in obj ply gpkg svg png; do
     refuses "mesh: unknown terrain, .$kind" 1 "nobody" mesh t.gpkg --terrain nobody --eps 1 -o "a.$kind"

@@ -61,7 +61,15 @@ refuses "import: a list that is not there" 1 "nothing.txt, a list of sources, ca
 printf 'whole.bil\ntiles/absent.bil\n' >list.txt
 refuses "import: a list names the line of what is missing" 1 "list.txt, line 2: tiles/absent.bil: No such file" import @list.txt x.gpkg
 refuses "import: a report in a folder that is not there" 1 "cannot be written" import --report nowhere/r.geojson whole.bil x.gpkg
+refuses "import: a report that would be the database" 1 "./x.gpkg is the database or a source" import --report ./x.gpkg whole.bil x.gpkg
+mkfifo pipe.geojson
+refuses "import: a report in place of a device" 1 "pipe.geojson cannot be written: it is a device" import --report pipe.geojson whole.bil x.gpkg
+[ -p pipe.geojson ] && [ ! -e pipe.geojson.part ]; ok "... which stays one" $?
+refuses "import: a report in place of a folder" 1 "tiles cannot be written: it is a folder" import --report tiles whole.bil x.gpkg
 [ ! -e x.gpkg ]; ok "refused imports leave no database" $?
+printf '\357\273\277whole.bil\r\n' >windows.txt
+rqt import @windows.txt x.gpkg
+[ $status = 0 ] && rm -f x.gpkg; ok "a list from Windows, with its byte order mark" $? "$(cat err)"
 
 rqt import --fill 2 --sea -3 holes.bil holes.gpkg
 [ $status = 0 ] && grep -q '25 void samples filled' out && grep -q '120 void samples made sea' out

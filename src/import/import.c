@@ -178,15 +178,15 @@ static bool describe_all(import_work *m, const char *const *arguments, int count
     return m->count > 0 || import_refuse(&m->job, "%s holds no raster of one band", arguments[0]);
 }
 
-/* The report replaces a file: not one that is read, nor the database. */
+/* The report replaces a file: not one that is read, nor the database, which may not be there yet. That it cannot be
+ * written is said before the sources are read, which may take hours, and not after. */
 static bool check_report(const import_work *m) {
     const char *report = m->job.options->report;
-    struct stat file, other;
-    if (!report || stat(report, &file)) return true;
-    bool same = !stat(m->job.database, &other) && file.st_dev == other.st_dev && file.st_ino == other.st_ino;
-    for (int i = 0; i < m->count && !same; i++)
-        same = !stat(m->sources[i].path, &other) && file.st_dev == other.st_dev && file.st_ino == other.st_ino;
-    return !same || import_refuse(&m->job, "%s is the database or a source, and cannot be the report too", report);
+    if (!report) return true;
+    bool same = import_is_same_file(report, m->job.database);
+    for (int i = 0; i < m->count && !same; i++) same = import_is_same_file(report, m->sources[i].path);
+    if (same) return import_refuse(&m->job, "%s is the database or a source, and cannot be the report too", report);
+    return import_findings_probe(&m->job);
 }
 
 static bool describe(import_work *m, const char *const *arguments, int count) {

@@ -66,6 +66,8 @@ void import_paths_place_sentence(const import_job *job, const import_paths *path
 void import_paths_tell_passed(const import_job *job, const import_paths *paths);
 void import_paths_free(import_paths *paths);
 bool import_is_folder(const char *path);
+/* Of two names that are not there yet, too: are they one place? */
+bool import_is_same_file(const char *a, const char *b);
 /* The last part of a path, without slashes at its end: for the terrain's name. free(). NULL: out of memory */
 char *import_base_of(const char *argument);
 
@@ -145,6 +147,8 @@ typedef struct import_findings {
 
 /* The worst of each kind, as sentences. Puts the conflicts into the order of the report. */
 void import_findings_tell(const import_job *job, const import_findings *findings);
+/* Can options->report be written? It is a new file, or takes a file's place. */
+bool import_findings_probe(const import_job *job);
 /* All of them into options->report. */
 bool import_findings_write(const import_job *job, const import_findings *findings);
 
