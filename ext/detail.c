@@ -1,4 +1,5 @@
-/* detail.c - the options detail and mode border: places with an eps of their own, and the rule that they make.
+/* detail.c - the options detail and mode border: places with an eps of their own, and the rule that they make. The
+ * option frame has such a rule, too; what it takes from eps is frame.c's.
  *
  * detail is a list, [[geometry as text, eps], ...], or the name of a table or view of this connection with a
  * geometry and an eps in each row: roads with half a metre, say, in a terrain at ten. It is read anew for each
@@ -253,8 +254,9 @@ static bool is_interrupted(void *context) {
 }
 
 int rule_read(request *r, char **error) {
-    if (!r->detail && r->mode != REQUEST_BORDER) return SQLITE_OK;
-    const char *option = r->detail ? "option \"detail\"" : "mode \"border\"";
+    const bool border = r->mode == REQUEST_BORDER;
+    if (!r->detail && !border && r->frame_kind == FRAME_CRS) return SQLITE_OK;
+    const char *option = r->detail ? "option \"detail\"" : border ? "mode \"border\"" : "option \"frame\"";
     if (r->options.metric != RQT_METRIC_EXACT && r->options.metric != RQT_METRIC_WEDGIE)
         return fail(error,
                     "%s needs the metric exact or wedgie: it adds vertices, and with metric \"%s\" nothing is "
@@ -267,7 +269,7 @@ int rule_read(request *r, char **error) {
         rqt_rule_create(&r->terrain->lattice, r->terrain->quantum_error, store_allocator(), &r->options.rule);
     if (status == RQT_OK && r->places)
         status = rqt_rule_set_places(r->options.rule, r->places->items, r->places->count);
-    if (status == RQT_OK && r->mode == REQUEST_BORDER) {
+    if (status == RQT_OK && border) {
         rqt_region_grow_rectangle(r->region);
         status = rqt_rule_force_border(r->options.rule, r->region, is_interrupted, &w);
     }

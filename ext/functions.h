@@ -75,7 +75,6 @@ typedef struct request {
     rqt_geometry *geometry;
     rqt_region *region; /* mode snap: grown to its squares */
     request_mode mode;
-    bool mode_given; /* the options name one */
     double eps;
     store_query_options options;
     struct cJSON *detail;  /* the option, as it came; NULL: none */
@@ -87,8 +86,9 @@ typedef struct request {
     double achieved_eps;   /* of the mesh: eps, or more to keep within max_vertices; known after request_patch */
 } request;
 
+/* `usual` is the mode when the options name none. */
 int request_read(connection *c, sqlite3_value *region, sqlite3_value *eps, sqlite3_value *terrain,
-                 sqlite3_value *options, request *out, char **error);
+                 sqlite3_value *options, request_mode usual, request *out, char **error);
 /* A patch with what the product needs; of strips, the one that the options want. Give it back with store_keep. */
 int request_patch(request *r, rqt_product product, rqt_patch *patch, store_reads *reads, char **error);
 /* Mode cut: that patch clipped to the region, instead. Release with rqt_cut_free. cut.c */
