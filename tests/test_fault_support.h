@@ -93,6 +93,17 @@ static const char *const further_statements[] = {
     "SELECT r.error, t.name FROM rqt_terrains t, rqt_range('POINT(-71.4 44.2)', 1, t.name) r",
     "SELECT * FROM rqt_verify(NULL, 2)",
     "SELECT level, extent, why, bytes, selected FROM rqt_explain(NULL, 2)", /* cached is no part of the answer */
+    "SELECT * FROM rqt_range(NULL, 30, NULL, '{\"detail\":[[\"POINT(-71.35 44.25)\",1],"
+    "[\"POLYGON((-71.4 44.2, -71.3 44.2, -71.3 44.3, -71.4 44.2))\",3]]}')",
+    "SELECT * FROM rqt_range(NULL, 30, NULL, '{\"detail\":\"places\"}')",
+    "SELECT * FROM rqt_verify(NULL, 30, NULL, '{\"detail\":\"main.places\",\"mode\":\"border\"}')",
+    "SELECT * FROM rqt_triangles('POLYGON((-71.4 44.2, -71.3 44.2, -71.3 44.3, -71.4 44.2))', 30, NULL, "
+    "'{\"mode\":\"cut\"}')",
+    "SELECT * FROM rqt_triangles('POINT(-71.3501 44.2501)', 30, NULL, '{\"mode\":\"snap\",\"outline\":\"tol\"}')",
+    "SELECT rqt_mesh(rqt_bbox(-71.4, 44.2, -71.3, 44.3), 30, 'obj', NULL, '{\"frame\":\"ecef\"}')",
+    "SELECT * FROM rqt_range(rqt_bbox(-71.4, 44.2, -71.3, 44.3), 30, NULL, '{\"frame\":\"enu\",\"mode\":\"cut\"}')",
+    "SELECT rqt_mesh(rqt_bbox(-71.4, 44.2, -71.3, 44.3), 30, 'ply+normals')",
+    "SELECT rqt_mesh(rqt_bbox(-71.4, 44.2, -71.3, 44.3), 30, 'rqt+normals')",
 };
 
 static inline int statement_count(void) {

