@@ -66,11 +66,20 @@ static inline file_path path_of(const char *name) {
     return p;
 }
 
-/* A new database with that terrain. */
+/* A new database with that terrain, and a table for the option detail. */
 static inline file_path demo_database(const char *name) {
     const import_options o = demo_options();
     const file_path database = path_of(name);
     import_fine(demo_raster("demo.tif", 0), database.text, &o);
+    sqlite3 *db = NULL;
+    assert_int_equal(sqlite3_open(database.text, &db), SQLITE_OK);
+    assert_int_equal(sqlite3_exec(db,
+                                  "CREATE TABLE places(geom TEXT, eps REAL);"
+                                  "INSERT INTO places VALUES ('POINT(-71.35 44.25)', 1), "
+                                  "('LINESTRING(-71.4 44.2, -71.3 44.3)', 3.5)",
+                                  NULL, NULL, NULL),
+                     SQLITE_OK);
+    assert_int_equal(sqlite3_close(db), SQLITE_OK);
     return database;
 }
 

@@ -219,9 +219,9 @@ static bool meet_triangle(profile *p, const uint32_t *corner, const line_piece *
         c[1] = c[2];
         c[2] = swap;
     }
+    /* Pieces come from points. NOLINTNEXTLINE(clang-analyzer-core.NullDereference) */
     const region_point a = piece->at.a, b = piece->at.b;
     const int of_a = place_in(c, a), of_b = place_in(c, b);
-    /* Pieces come from points. NOLINTNEXTLINE(clang-analyzer-core.NullDereference) */
     const bool own = p->line->own[piece->point] != 0;
     int side[3];
     for (int i = 0; i < 3; i++) {
