@@ -19,6 +19,7 @@ typedef struct places {
 static int grow(places *p) {
     if (p->count < p->capacity) return SQLITE_OK;
     const size_t more = p->capacity ? 2 * p->capacity : 64;
+    /* Pointers. NOLINTNEXTLINE(bugprone-sizeof-expression) */
     rqt_region **regions = sqlite3_realloc64(p->regions, more * sizeof *regions);
     if (regions) p->regions = regions;
     rqt_rule_place *items = sqlite3_realloc64(p->items, more * sizeof *items);
@@ -51,6 +52,7 @@ static int read_list(request *r, const cJSON *list, char **error) {
         char what[32];
         sqlite3_snprintf(sizeof what, what, "detail %d", ++n);
         const cJSON *geometry = cJSON_IsArray(pair) ? pair->child : NULL, *eps = geometry ? geometry->next : NULL;
+        /* What is not there is no number. NOLINTNEXTLINE(clang-analyzer-core.NullDereference) */
         if (!cJSON_IsString(geometry) || !cJSON_IsNumber(eps) || eps->next)
             return fail(error, "%s must be [geometry as text, eps]", what);
         code =

@@ -237,6 +237,7 @@ static int meet_side(const cutting *c, const region_piece *piece, rqt_vertex u, 
     const int64_t longer = wide > high ? wide : high, step = wide == 0 || high == 0 || wide == high ? longer : 1;
     /* `step` is how much finer than 2^-G of the side the grid is along it */
     const int64_t share = (int64_t)cut_share((uint64_t)step << c->grid, from, from + to);
+    /* A side has a length. NOLINTNEXTLINE(clang-analyzer-core.DivideZero) */
     at[0] = (region_point){((int64_t)u.x << c->grid) + across / step * share,
                            ((int64_t)u.y << c->grid) + down / step * share};
     return 1;

@@ -164,7 +164,7 @@ static int64_t sample_count(const import_work *m) {
 static bool describe_all(import_work *m, const char *const *arguments, int count) {
     import_paths *paths = &m->paths;
     if (!import_paths_find(&m->job, arguments, count, paths)) return false;
-    m->sources = calloc((size_t)paths->count, sizeof *m->sources);
+    m->sources = calloc((size_t)paths->count + 1, sizeof *m->sources);
     if (!m->sources) return import_no_memory(&m->job, "describing the sources");
     for (int i = 0; i < paths->count; i++) {
         import_source *s = &m->sources[m->count];
