@@ -86,9 +86,8 @@ void bench_options(bench_table *table, sqlite3 *db, const double box[4], const d
         {"... mode cut", TRIANGLES, "{\"mode\":\"cut\"}", polygon, 5, 3},
         {"overview, eps 200, outline exact", TRIANGLES, NULL, NULL, 200, -1},
         {"... outline tol", TRIANGLES, "{\"outline\":\"tol\"}", NULL, 200, 6},
-        {"corridor of 300 m, eps 5", "SELECT count(*) FROM rqt_triangles(rqt_corridor(?1, 300), ?2, NULL, ?3)",
-         NULL, line, 5, 0},
-        {"profile along the line, eps 5", "SELECT count(*) FROM rqt_profile(?1, ?2, NULL, ?3)", NULL, line, 5, 0},
+        {"profile along the line, eps 5", "SELECT count(*) FROM rqt_profile(?1, ?2) WHERE ?3 IS NULL", NULL, line,
+         5, 0},
     };
     enum { QUESTIONS = sizeof questions / sizeof *questions };
     static bench_times times[QUESTIONS];
