@@ -169,7 +169,7 @@ for given in (places[:1], places[1:2]):
     db.execute("DETACH passing")
 said = [9]
 db.create_function("said", 0, lambda: said[0])
-db.execute("CREATE TEMP VIEW spoken AS SELECT the_geom AS geom, said() AS eps FROM main.roads WHERE eps = 9")
+db.execute("CREATE VIEW spoken AS SELECT the_geom AS geom, said() AS eps FROM roads WHERE eps = 9")
 db.execute("CREATE VIEW lanes AS SELECT * FROM roads WHERE eps = 9")
 db.commit()
 same("a view", "lanes", places[1:2])
@@ -177,6 +177,7 @@ same("a view over a function", "spoken", places[1:2])
 said[0] = 2.5
 same("... that says something else", "spoken", [(places[1][0], 2.5)])
 db.execute("DROP VIEW lanes")
+db.execute("DROP VIEW spoken")
 db.commit()
 # SQLite tells an authorizer which columns are read, when a statement is made.
 db.execute("CREATE TABLE lanes(geom, eps)")

@@ -262,7 +262,7 @@ static void bench_large(bench_table *table, const char *large_path) {
 /* ------------------------------------------------------------------------------------- whole programs -- */
 static bench_times imports, large_imports;
 static double large_samples, large_rss;
-static bench_times cog, cog_threads;
+static bench_times cog, cog_threads, updates;
 static double database_bytes, cog_bytes, samples;
 
 static void read_times(const char *path) {
@@ -275,6 +275,7 @@ static void read_times(const char *path) {
         if (!strcmp(what, "large_import")) bench_add(&large_imports, value);
         if (!strcmp(what, "large_samples")) large_samples = value;
         if (!strcmp(what, "large_rss_kib") && value > large_rss) large_rss = value;
+        if (!strcmp(what, "update")) bench_add(&updates, value);
         if (!strcmp(what, "cog")) bench_add(&cog, value);
         if (!strcmp(what, "cog_threads")) bench_add(&cog_threads, value);
         if (!strcmp(what, "database_bytes")) database_bytes = value;
@@ -295,6 +296,8 @@ static void show_import(bench_table *table) {
                     NO_AIM);
     bench_table_row(table, "rqt import", &imports, "s", 1, false, peer, &cog, (bench_aim){BENCH_AT_MOST, 1});
     bench_table_row(table, "rqt import", &imports, "Msamp/s", samples / 1e6, true, peer, &cog, NO_AIM);
+    bench_table_row(table, "rqt update of 64 x 64 samples, the whole program", &updates, "s", 1, false, "import",
+                    &imports, NO_AIM);
     if (large_imports.runs) {
         static bench_times small_rate, large_rate; /* seconds a sample */
         for (int i = 0; i < imports.runs; i++) bench_add(&small_rate, imports.value[i] / samples);
@@ -498,6 +501,9 @@ int main(int argc, char **argv) {
     show_import(&table);
     bench_rows(&table);
     bench_heights(&table);
+    sqlite3 *db = open_database(true);
+    bench_options(&table, db, box, whole);
+    sqlite3_close(db);
     if (argc == 9) bench_large(&table, argv[8]);
     if (!bench_table_close(&table)) stop(argv[5], "cannot be written");
     return 0;

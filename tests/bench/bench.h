@@ -49,4 +49,8 @@ void bench_table_count(bench_table *table, const char *what, double value, const
 /* false: the CSV file is not whole. */
 bool bench_table_close(bench_table *table);
 
+/* Rows of section "options": db may be written; boxes are x0, y0, x1, y1 in its coordinates. bench_options.c */
+struct sqlite3;
+void bench_options(bench_table *table, struct sqlite3 *db, const double box[4], const double whole[4]);
+
 #endif

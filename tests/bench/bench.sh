@@ -39,7 +39,7 @@ compile() { # OUTPUT FLAGS SOURCES...
 compile "$OUT/make_terrain" "" tests/bench/make_terrain.c
 compile "$OUT/mirror_terrain" "" tests/bench/mirror_terrain.c
 compile "$OUT/bench" "$(gdal-config --cflags) -lsqlite3 $(gdal-config --libs) -lm" \
-    tests/bench/bench.c tests/bench/bench_table.c
+    tests/bench/bench.c tests/bench/bench_options.c tests/bench/bench_table.c
 
 if [[ ! -e $raster || $OUT/make_terrain -nt $raster ]]; then
     echo "Generating $side x $side samples ..." >&2
@@ -66,6 +66,13 @@ for ((run = 1; run <= RUNS; run++)); do
     timed cog cog
     rm -f "$OUT/cog.tif"
     timed cog_threads cog -co NUM_THREADS=ALL_CPUS
+done
+# 64 x 64 samples become others, and what they were again: twice as many updates as imports.
+square=(-srcwin $((side / 2)) $((side / 2)) 64 64)
+gdal_translate -q "${square[@]}" "$raster" "$OUT/square_old.tif"
+gdal_translate -q "${square[@]}" -scale 0 4000 400 4000 "$raster" "$OUT/square_new.tif"
+for ((run = 1; run <= RUNS; run++)); do
+    for square in new old; do timed update "$RQT" update "$OUT/square_$square.tif" "$OUT/fbm.gpkg"; done
 done
 [[ ! -t 2 ]] || printf '\r%40s\r' '' >&2
 echo "database_bytes $(stat -c %s "$OUT/fbm.gpkg")" >>"$times"

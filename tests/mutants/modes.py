@@ -87,8 +87,6 @@ MUTANTS = [
     # what is kept of a table
     ("detail: places are kept whatever changes", "ext/detail.c", "p->state == store_state(r->store) && ", "",
      "test_sql_detail.py", "kept places"),
-    ("detail: while the connection writes, places are kept", "src/store/store.c", "return s->known ? s->state : 0;",
-     "return s->state;", "test_sql_detail.py", "kept places"),
     ("detail: a table of temp is kept", "ext/detail.c", 'if (sqlite3_stricmp(s->schema, "temp") == 0) return SQLITE_OK;', "",
      "test_sql_detail.py", "kept places: temp changes unseen"),
     ("detail: a view is kept", "ext/detail.c", "type = 'table' AND rootpage > 0 ", "1 ",
