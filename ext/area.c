@@ -105,11 +105,12 @@ static int measure_region(request *r, measurer *m, char **error) {
 
 int fill_area(connection *c, sqlite3_value **arguments, row_set *rows, char **error) {
     request r;
-    int code = request_read(c, arguments[0], arguments[1], arguments[2], arguments[3], &r, error);
+    int code = request_read(c, arguments[0], arguments[1], arguments[2], arguments[3], REQUEST_CUT, &r, error);
     if (code != SQLITE_OK) return code;
-    if (!r.mode_given) r.mode = REQUEST_CUT;
     measurer m = {.terrain = r.terrain, .ellipsoid = GEO_WGS84, .metre = terrain_metre(r.terrain)};
-    if (r.terrain->lonlat && !r.terrain->wgs84 && !geo_ellipsoid_of_wkt(r.terrain->crs, &m.ellipsoid))
+    if (r.frame) code = fail(error, "areas are measured on the ellipsoid: option \"frame\" must be crs");
+    if (code == SQLITE_OK && r.terrain->lonlat && !r.terrain->wgs84 &&
+        !geo_ellipsoid_of_wkt(r.terrain->crs, &m.ellipsoid))
         code = fail(error, "the CRS of terrain %s names no ellipsoid", r.terrain->name);
     double *out = NULL;
     if (code == SQLITE_OK) code = (out = sqlite3_malloc(4 * sizeof *out)) ? SQLITE_OK : SQLITE_NOMEM;

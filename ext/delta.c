@@ -121,7 +121,8 @@ void call_delta(sqlite3_context *result, int count, sqlite3_value **arguments) {
     else if (from < to)
         code = fail(&error, "eps_from must not be less than eps_to; it is %!.15g", from);
     if (code == SQLITE_OK)
-        code = request_read(c, arguments[0], arguments[2], count > 3 ? arguments[3] : NULL, NULL, &r, &error);
+        code = request_read(c, arguments[0], arguments[2], count > 3 ? arguments[3] : NULL, NULL, REQUEST_COVER, &r,
+                            &error);
     if (code == SQLITE_OK) code = increment(&r, from, &bytes, &size, &error);
     request_free(&r);
     if (code != SQLITE_OK)

@@ -172,9 +172,6 @@ static int lower_eps(request *r, space_frame *f, char **error) {
     double lowering[RQT_RANKS];
     geo_frame_sag(f->geo, &extent, RQT_RANKS, lowering);
     for (int i = 0; i < RQT_RANKS; i++) lowering[i] += f->merging;
-    if (!r->options.rule &&
-        rqt_rule_create(&t->lattice, t->quantum_error, store_allocator(), &r->options.rule) != RQT_OK)
-        return SQLITE_NOMEM;
     return rqt_rule_set_lowering(r->options.rule, lowering) == RQT_OK
                ? SQLITE_OK
                : fail(error, "terrain %s is too large for option \"frame\"", t->name);
@@ -214,6 +211,12 @@ int frame_read(request *r, char **error) {
     f->seam = fabs(fabs((t->lattice.width - 1) * t->placement.dx) - 360) < 1e-9 * 360;
     for (int p = 0; p < 2; p++)
         f->pole[p] = fabs(fabs(latitude(t, p ? t->lattice.height - 1 : 0)) - 90) < 1e-9 * 90;
+    if (f->seam && r->max_vertices > 0)
+        return fail(
+            error,
+            "option \"max_vertices\" does not go with option \"frame\":\"%s\" on terrain %s, which closes on "
+            "itself: what its two rims need depends on eps",
+            name, t->name);
     int code = f->seam ? read_seam(r, f, error) : SQLITE_OK;
     for (int p = 0; p < 2 && code == SQLITE_OK; p++)
         if (f->pole[p]) code = read_pole(r, f, p, error);
@@ -299,8 +302,11 @@ int frame_places(const space_frame *f, const rqt_patch *patch, double **xyz, cha
     if (!*xyz) return SQLITE_NOMEM;
     for (size_t i = 0; i < patch->vertex_count; i++) {
         const rqt_patch_vertex *v = &patch->vertices[i];
-        const double lonlath[3] = {at->x0 + v->col * at->dx, at->y0 + v->row * at->dy,
-                                   rqt_unit_metres(&f->terrain->unit, v->q)};
+        double lonlath[3] = {at->x0 + v->col * at->dx, latitude(f->terrain, v->row),
+                             rqt_unit_metres(&f->terrain->unit, v->q)};
+        /* A row of cells ends at the pole, and its last place beyond it, by a rounding. */
+        if ((f->pole[0] && v->row == 0) || (f->pole[1] && v->row == f->terrain->lattice.height - 1))
+            lonlath[1] = copysign(90, lonlath[1]);
         double *p = *xyz + 3 * i;
         geo_frame_place(f->geo, lonlath, p);
         if (!isfinite(p[0]) || !isfinite(p[1]) || !isfinite(p[2]))

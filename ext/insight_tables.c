@@ -216,7 +216,7 @@ static void explain_column(void *data, size_t row, int column, sqlite3_context *
 
 int fill_explain(connection *c, sqlite3_value **arguments, row_set *rows, char **error) {
     request r;
-    int code = request_read(c, arguments[0], arguments[1], arguments[2], arguments[3], &r, error);
+    int code = request_read(c, arguments[0], arguments[1], arguments[2], arguments[3], REQUEST_COVER, &r, error);
     if (code != SQLITE_OK) return code;
     explanation *e = sqlite3_malloc(sizeof *e);
     code = e ? SQLITE_OK : SQLITE_NOMEM;

@@ -73,7 +73,7 @@ static int make_cut(request *r, rqt_product product, mesh *m, char **error) {
 static int make_mesh(connection *c, sqlite3_value **arguments, rqt_product product, row_set *rows, mesh **out,
                      char **error) {
     request r;
-    int code = request_read(c, arguments[0], arguments[1], arguments[2], arguments[3], &r, error);
+    int code = request_read(c, arguments[0], arguments[1], arguments[2], arguments[3], REQUEST_COVER, &r, error);
     if (code != SQLITE_OK) return code;
     mesh *m = sqlite3_malloc(sizeof *m);
     code = m ? SQLITE_OK : SQLITE_NOMEM;

@@ -67,10 +67,7 @@ static int read_one(const cJSON *item, request *r, char **error) {
         return fail(error, "option \"%s\" has no value \"%s\"; this version knows%.*s", c->key, value,
                     (int)strlen(c->done) - 1, c->done);
     /* The lists above are in the order of the enumerations. */
-    if (strcmp(c->key, "mode") == 0) {
-        r->mode = (request_mode)index_of(c, value);
-        r->mode_given = true;
-    }
+    if (strcmp(c->key, "mode") == 0) r->mode = (request_mode)index_of(c, value);
     if (strcmp(c->key, "frame") == 0) r->frame_kind = (frame_kind)index_of(c, value);
     if (strcmp(c->key, "outline") == 0) r->options.outline = (rqt_outline)index_of(c, value);
     if (strcmp(c->key, "select") == 0) r->options.select = (rqt_select)index_of(c, value);

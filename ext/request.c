@@ -50,8 +50,8 @@ static int read_region(request *r, sqlite3_value *value, char **error) {
 }
 
 int request_read(connection *c, sqlite3_value *region, sqlite3_value *eps, sqlite3_value *terrain,
-                 sqlite3_value *options, request *r, char **error) {
-    memset(r, 0, sizeof *r);
+                 sqlite3_value *options, request_mode usual, request *r, char **error) {
+    *r = (request){.mode = usual};
     if (!request_number(eps, "eps", &r->eps, error)) return *error ? SQLITE_ERROR : SQLITE_NOMEM;
     if (r->eps < 0) return fail(error, "eps must be 0 or more; it is %!.15g", r->eps);
     r->options = (store_query_options){.select = RQT_SELECT_THRESHOLD, .outline = RQT_OUTLINE_EXACT};

@@ -156,10 +156,13 @@ typedef struct mesh_format {
     char name[16]; /* without "+normals"; cut where it is none of ours */
 } mesh_format;
 
+#define KNOWN " strip indexed rqt obj ply wkb gpkg spatialite ply+normals rqt+normals"
+
 static int read_format(sqlite3_value *value, mesh_format *f, char **error) {
     static const char *const own[] = {"strip", "indexed", "rqt"};
     static const char with_normals[] = "+normals";
-    const char *text = sqlite3_value_type(value) == SQLITE_TEXT ? (const char *)sqlite3_value_text(value) : "";
+    if (sqlite3_value_type(value) != SQLITE_TEXT) return fail(error, "format must be a text: one of%s", KNOWN);
+    const char *text = (const char *)sqlite3_value_text(value);
     if (!text) return SQLITE_NOMEM;
     const size_t length = strlen(text), suffix = sizeof with_normals - 1;
     const bool normals = length > suffix && strcmp(text + length - suffix, with_normals) == 0;
@@ -169,7 +172,7 @@ static int read_format(sqlite3_value *value, mesh_format *f, char **error) {
         if (strcmp(f->name, own[i]) == 0) f->family = i;
     if (strcmp(f->name, "glb") == 0) return fail(error, "format \"%s\" is not in this version", text);
     if (f->family == MESH_OTHER && !format_from_name(f->name, &f->kind))
-        return fail(error, "unknown format \"%s\"; there are strip indexed rqt obj ply wkb gpkg spatialite", text);
+        return fail(error, "unknown format \"%s\"; there are%s", text, KNOWN);
     if (f->normals && f->family != MESH_WIRE && f->kind != FORMAT_PLY)
         return fail(error, "format \"%s\" has no normals; ply and rqt have", f->name);
     return SQLITE_OK;
@@ -204,7 +207,7 @@ void call_mesh(sqlite3_context *result, int count, sqlite3_value **arguments) {
     int code = read_format(arguments[2], &f, &error);
     if (code == SQLITE_OK)
         code = request_read(sqlite3_user_data(result), arguments[0], arguments[1], count > 3 ? arguments[3] : NULL,
-                            count > 4 ? arguments[4] : NULL, &r, &error);
+                            count > 4 ? arguments[4] : NULL, REQUEST_COVER, &r, &error);
     if (code == SQLITE_OK && r.frame && f.family != MESH_OTHER)
         code =
             fail(&error, "format \"%s\" holds samples, not points in space: option \"frame\" must be crs", f.name);

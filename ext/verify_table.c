@@ -155,7 +155,7 @@ static int prove(request *r, proof *p, char **error) {
 
 int fill_verify(connection *c, sqlite3_value **arguments, row_set *rows, char **error) {
     request r;
-    int code = request_read(c, arguments[0], arguments[1], arguments[2], arguments[3], &r, error);
+    int code = request_read(c, arguments[0], arguments[1], arguments[2], arguments[3], REQUEST_COVER, &r, error);
     if (code != SQLITE_OK) return code;
     proof *p = sqlite3_malloc(sizeof *p);
     code = p ? SQLITE_OK : SQLITE_NOMEM;

@@ -274,6 +274,12 @@ def areas_in_the_plane():
         near("areas: a triangle on %s at %d, triangle by triangle" % (name, eps),
              one(db, "SELECT * FROM rqt_area(?, ?, ?)", "POLYGON((%r %r, %r %r, %r %r, %r %r))" % (a + b + c + a), eps, name),
              total, 1e-8)
+    for options, sentence in (('{"max_vertices":50}', 'option "max_vertices" does not go with mode "cut"'),
+                              ('{"strip":"fan"}', 'option "strip":"fan" does not go with mode "cut"')):
+        raises("areas: cut is the mode, and what does not go with it is refused: " + options, "rqt_area(): " + sentence,
+               lambda: one(db, "SELECT * FROM rqt_area(NULL, 0, 'cone', ?)", options))
+    check("areas: with another mode a budget works", one(db, "SELECT achieved_eps FROM rqt_area(NULL, 0, 'cone', "
+                                                          "'{\"mode\":\"cover\",\"max_vertices\":50}')") > 0)
     equal("areas: outside", one(db, "SELECT * FROM rqt_area(rqt_bbox(-9, 1, -8, 2), 0, 'cone')"), (0.0, 0.0, 0.0))
     raises("areas: eps is checked", "rqt_area(): eps must be 0 or more", lambda: one(db, "SELECT * FROM rqt_area(NULL, -1, 'cone')"))
     db.enable_load_extension(True)
@@ -297,6 +303,10 @@ def areas_on_the_ellipsoid():
                    block=4)
     import_terrain(path, write_grid(temp("sea.asc"), [[0] * 361 for _ in range(181)], x0=0, y0=-90, crs=WGS84), name="sea", block=4)
     db = connect(path)
+    for options, sentence in (('{"frame":"ecef"}', 'option "frame" does not go with mode "cut"'),
+                              ('{"frame":"enu","mode":"cover"}', "areas are measured on the ellipsoid")):
+        raises("areas: frames are refused, " + options, "rqt_area(): " + sentence,
+               lambda: one(db, "SELECT * FROM rqt_area(NULL, 1e6, 'sea', ?)", options))
     whole = 4 * math.pi * quarter(90)
     seen = one(db, "SELECT * FROM rqt_area(NULL, 0, 'sea')")
     near("areas: the Earth at height 0", seen, (whole, whole, 0))
@@ -593,6 +603,20 @@ def frames():
     check("frames: places of detail are finer in space too", fine > coarse, (fine, coarse))
     raises("frames: not with mode cut", 'option "frame" does not go with mode "cut"',
            lambda: one(db, "SELECT count(*) FROM rqt_range(NULL, 50, 'globe', '{\"frame\":\"ecef\",\"mode\":\"cut\"}')"))
+    for more in ('"metric":"local"', '"metric":"minimal"', '"metric":"euclid"'):
+        raises("frames: not with %s, which proves nothing of them" % more, 'option "frame" needs the metric exact or wedgie',
+               lambda: one(db, "SELECT count(*) FROM rqt_range(NULL, 50, 'tile', ?)", '{"frame":"ecef",%s}' % more))
+    raises("frames: no budget where the Earth closes", 'option "max_vertices" does not go with option "frame"',
+           lambda: one(db, "SELECT count(*) FROM rqt_range(NULL, 50, 'globe', '{\"frame\":\"ecef\",\"max_vertices\":1000}')"))
+    check("frames: a budget elsewhere", one(db, "SELECT count(*) FROM rqt_range(NULL, 0, 'tile', "
+                                            "'{\"frame\":\"ecef\",\"max_vertices\":100}')") <= 100)
+    # 14 rows of 180/13 degrees: the first comes out as 90.00000000000003
+    import_terrain(path, write_grid(temp("past.asc"), [[5] * 14 for _ in range(14)], y0=-90, cell=180 / 13, crs=WGS84), name="past",
+                   block=2)
+    check("F28 a row beyond the pole by a rounding, to begin with", one(db, "SELECT y0 FROM rqt_terrains WHERE name = 'past'") > 90)
+    equal("F28 a row beyond the pole by a rounding is the pole",
+          one(db, "SELECT count(*), min(abs(z)) > 6356000 FROM rqt_range(NULL, 1e6, 'past', '{\"frame\":\"ecef\"}') "
+                  "WHERE abs(x) < 1e-3 AND abs(y) < 1e-3"), (2, 1))
     db.close()
 
 

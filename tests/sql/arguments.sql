@@ -109,9 +109,9 @@ SELECT rqt_mesh(NULL, 1, 'OBJ');
 SELECT rqt_mesh(NULL, 1, '');
 --! rqt_mesh(): unknown format ""
 SELECT rqt_mesh(NULL, 1, NULL);
---! rqt_mesh(): 
+--! rqt_mesh(): format must be a text: one of strip indexed rqt obj
 SELECT rqt_mesh(NULL, 1, 7);
---! rqt_mesh(): 
+--! rqt_mesh(): format must be a text
 SELECT rqt_mesh(NULL, 1, 'glb');
 --! rqt_mesh(): format "glb" is not in this version
 SELECT typeof(rqt_mesh(NULL, 1, 'rqt')), hex(substr(rqt_mesh(NULL, 1, 'rqt'), 1, 5));
