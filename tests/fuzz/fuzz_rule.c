@@ -143,6 +143,29 @@ static void heights_of(const rqt_patch *patch, double *low, double *high) {
     *low -= slack, *high += slack;
 }
 
+/* Does the place lie in a triangle of the patch, with that triangle's height? Doubles are near enough. */
+static bool is_on_mesh(const rqt_patch *patch, double col, double row, double q) {
+    for (size_t i = 0; i < patch->triangle_count; i++) {
+        const rqt_patch_vertex *v[3];
+        for (int c = 0; c < 3; c++) v[c] = &patch->vertices[patch->triangles[3 * i + (size_t)c]];
+        double share[3], whole = 0, height = 0, steep = 1;
+        for (int c = 0; c < 3; c++) {
+            const rqt_patch_vertex *a = v[(c + 1) % 3], *b = v[(c + 2) % 3];
+            share[c] = (a->col - col) * (b->row - row) - (a->row - row) * (b->col - col);
+            whole += share[c];
+        }
+        for (int c = 0; c < 3; c++) {
+            share[c] /= whole;
+            height += share[c] * v[c]->q;
+            steep = fmax(steep, fabs((double)v[c]->q));
+        }
+        /* a place of the grid may lie 2^-20 sample beside a crossing */
+        if (share[0] > -1e-5 && share[1] > -1e-5 && share[2] > -1e-5 && fabs(height - q) <= 1e-5 * steep)
+            return true;
+    }
+    return false;
+}
+
 static double area_of_patch(const rqt_patch *patch) {
     double area = 0;
     for (size_t i = 0; i < patch->triangle_count; i++) {
@@ -172,6 +195,7 @@ static void clip(const rqt_patch *patch, const rqt_region *region, const rqt_lat
             HOLD(v->col >= 0 && v->col <= l->width - 1 && v->row >= 0 && v->row <= l->height - 1, "(%g,%g)", v->col,
                  v->row);
             HOLD(v->q >= low && v->q <= high, "height %g of %g .. %g", v->q, low, high);
+            HOLD(is_on_mesh(patch, v->col, v->row, v->q), "(%g,%g,%g) is not on the mesh", v->col, v->row, v->q);
         }
         edge *edges = calloc(3 * cut.triangle_count + 1, sizeof *edges);
         if (!edges) abort();
@@ -242,6 +266,7 @@ static void profile(input *in, const rqt_patch *patch, const rqt_lattice *l, con
         HOLD(r->col >= 0 && r->col <= l->width - 1 && r->row >= 0 && r->row <= l->height - 1, "(%g,%g)", r->col,
              r->row);
         HOLD(r->q >= low && r->q <= high, "height %g of %g .. %g", r->q, low, high);
+        HOLD(is_on_mesh(patch, r->col, r->row, r->q), "(%g,%g,%g) is not on the mesh", r->col, r->row, r->q);
         HOLD(line.period > 0 || r->turn == 0, "turn %d", r->turn);
         if (i > 0)
             HOLD(rows[i - 1].point < r->point || (rows[i - 1].point == r->point && rows[i - 1].t <= r->t),
