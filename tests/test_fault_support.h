@@ -110,7 +110,7 @@ static const char *const further_statements[] = {
     "'{\"mode\":\"cut\"}')",
     "SELECT * FROM rqt_triangles('POINT(-71.3501 44.2501)', 30, NULL, '{\"mode\":\"snap\",\"outline\":\"tol\"}')",
     "SELECT rqt_mesh(rqt_bbox(-71.4, 44.2, -71.3, 44.3), 30, 'obj', NULL, '{\"frame\":\"ecef\"}')",
-    "SELECT * FROM rqt_range(rqt_bbox(-71.4, 44.2, -71.3, 44.3), 30, NULL, '{\"frame\":\"enu\",\"mode\":\"cut\"}')",
+    "SELECT * FROM rqt_range(rqt_bbox(-71.4, 44.2, -71.3, 44.3), 30, NULL, '{\"frame\":\"enu\"}')",
     "SELECT rqt_mesh(rqt_bbox(-71.4, 44.2, -71.3, 44.3), 30, 'ply+normals')",
     "SELECT rqt_mesh(rqt_bbox(-71.4, 44.2, -71.3, 44.3), 30, 'rqt+normals')",
 };

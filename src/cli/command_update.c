@@ -1,8 +1,6 @@
 /* command_update.c - rqt update: options, progress and the report around import_update. */
-#include "cli.h"
-#include "import.h"
+#include "command_sources.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -56,27 +54,8 @@ static const struct option OPTIONS[] = {{"terrain", required_argument, NULL, TER
                                         {"help", no_argument, NULL, 'h'},
                                         {NULL, 0, NULL, 0}};
 
-/* Set by Ctrl-C (and by a polite kill); the progress callback hands it on, and the update rolls back. */
-static volatile sig_atomic_t stopped;
-
-static void stop(int number) {
-    (void)number;
-    stopped = 1;
-}
-
-static bool on_progress(void *context, const char *stage, double done, int64_t samples) {
-    cli_progress_show(context, stage, done, samples);
-    return !stopped;
-}
-
-static void on_notice(void *context, const char *sentence) {
-    cli_progress_wipe(context);
-    cli_say("%s", sentence);
-}
-
 /* CLI_OK, or CLI_USAGE after a sentence. */
 static int set_option(import_options *o, bool *voids, int option) {
-    double number;
     switch (option) {
     case TERRAIN:
         o->name = optarg;
@@ -85,19 +64,9 @@ static int set_option(import_options *o, bool *voids, int option) {
         *voids = true;
         return CLI_OK;
     case NODATA:
-        if (!cli_number(optarg, &number)) {
-            if (strcasecmp(optarg, "nan")) return cli_usage("--nodata %s is not a number", optarg);
-            number = (double)NAN;
-        }
-        o->has_nodata = true;
-        o->nodata = number;
-        return CLI_OK;
+        return sources_set_nodata(o);
     case UNIT:
-        if (strcmp(optarg, "m") && strcmp(optarg, "ft") && strcmp(optarg, "us-ft") &&
-            !(cli_number(optarg, &number) && number > 0))
-            return cli_usage("--unit %s: m, ft, us-ft or a number of metres", optarg);
-        o->unit = optarg;
-        return CLI_OK;
+        return sources_set_unit(o);
     default:
         return CLI_USAGE; /* cli_option has said why */
     }
@@ -128,17 +97,7 @@ static int run(int argc, char **argv) {
         return cli_usage(argc == optind ? "a source and a database are missing"
                                         : "the database is missing: rqt update SOURCE... DATABASE");
     cli_progress progress;
-    cli_progress_begin(&progress);
-    options.progress = on_progress;
-    options.notice = on_notice;
-    options.context = &progress;
-
-    /* The second Ctrl-C ends the process as usual: SQLite rolls back when the database is next opened. */
-    const struct sigaction action = {.sa_handler = stop, .sa_flags = (int)SA_RESETHAND};
-    sigaction(SIGINT, &action, NULL);
-    sigaction(SIGTERM, &action, NULL);
-    /* A limit on the size of files (ulimit -f) is a full disk, of which we and SQLite know how to tell. */
-    signal(SIGXFSZ, SIG_IGN);
+    sources_watch(&options, &progress);
 
     import_update_report report;
     char message[2048];
