@@ -474,7 +474,7 @@ static void F51_others_see_the_old_state_or_the_new_one(void **unused) {
         /* Nobody else writes meanwhile: a sentence, not a wait for ever. */
         const char *patch = shifted_window("patch.tif", 0, 0, GDT_Int16, 0, 0);
         assert_int_equal(update_many(&patch, 1, database, &o, false), 1);
-        assert_non_null(strstr(message, "is locked"));
+        assert_non_null(strstr(message, "is locked: another program is reading or writing it"));
         execute(db, "COMMIT");
         assert_int_equal(height_of(s), old + 9);
         update_fine(patch, database, &o, false);

@@ -23,7 +23,7 @@ bool import_database_refuse(const import_job *job, int code, char *detail) {
     switch (code & 0xFF) {
     case SQLITE_BUSY:
     case SQLITE_LOCKED:
-        import_refuse(job, "%s is locked: another program is writing it (%s)", path, more);
+        import_refuse(job, "%s is locked: another program is reading or writing it (%s)", path, more);
         break;
     case SQLITE_READONLY:
         import_refuse(job, "%s is read-only (%s)", path, more);
