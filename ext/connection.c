@@ -12,6 +12,7 @@
 struct connection {
     sqlite3 *db;
     store *store;
+    places *kept; /* NULL: none */
     int holders;
     bool owned; /* rqt_terrains is connected */
     bool busy;  /* a call of ours is under way */
@@ -28,6 +29,10 @@ sqlite3 *connection_db(const connection *c) {
     return c->db;
 }
 
+places **connection_places(connection *c) {
+    return &c->kept;
+}
+
 void connection_hold(connection *c) {
     c->holders++;
 }
@@ -35,6 +40,7 @@ void connection_hold(connection *c) {
 void connection_release(void *p) {
     connection *c = p;
     if (--c->holders > 0) return;
+    places_release(c->kept);
     store_close(c->store);
     sqlite3_free(c);
 }

@@ -2,23 +2,52 @@
  * option frame has such a rule, too; what it takes from eps is frame.c's.
  *
  * detail is a list, [[geometry as text, eps], ...], or the name of a table or view of this connection with a
- * geometry and an eps in each row: roads with half a metre, say, in a terrain at ten. It is read anew for each
- * query, all of it: how coarse the mesh may be here depends on places far away (rqt_rule), and so all answers are
- * parts of one mesh. */
+ * geometry and an eps in each row: roads with half a metre, say, in a terrain at ten. All of it is read: how coarse
+ * the mesh may be here depends on places far away (rqt_rule), and so all answers are parts of one mesh.
+ *
+ * Reading takes longer than most queries. So the connection keeps what the last table said while that is sure to be
+ * what it says: no database has changed (store_state), the name means the same table, and it is a table with rows
+ * of its own. Views may say something else each time, what temp holds changes unseen, and transformations go by
+ * tables and functions that may be anywhere: those are read for each query. */
 #include "functions.h"
 
 #include <cjson/cJSON.h>
 #include <string.h>
 
-typedef struct places {
+#define KEPT_BYTES ((size_t)64 << 20) /* of places that are kept; with more, they are not */
+
+struct places {
+    int holders;
     rqt_region **regions; /* as many as places */
     rqt_rule_place *items;
     size_t count, capacity;
-} places;
+    /* what they are true for, when they may be kept */
+    char *schema, *table; /* as the request had them */
+    uint64_t state;
+    const store_terrain *terrain; /* never read, only compared */
+    bool transformed;
+};
+
+void places_release(places *p) {
+    if (!p || --p->holders > 0) return;
+    for (size_t i = 0; i < p->count; i++) rqt_region_free(p->regions[i]);
+    sqlite3_free(p->regions);
+    sqlite3_free(p->items);
+    sqlite3_free(p->schema);
+    sqlite3_free(p->table);
+    sqlite3_free(p);
+}
+
+static int places_create(places **p) {
+    *p = sqlite3_malloc(sizeof **p);
+    if (*p) **p = (places){.holders = 1};
+    return *p ? SQLITE_OK : SQLITE_NOMEM;
+}
 
 static int grow(places *p) {
     if (p->count < p->capacity) return SQLITE_OK;
     const size_t more = p->capacity ? 2 * p->capacity : 64;
+    /* Pointers. NOLINTNEXTLINE(bugprone-sizeof-expression) */
     rqt_region **regions = sqlite3_realloc64(p->regions, more * sizeof *regions);
     if (regions) p->regions = regions;
     rqt_rule_place *items = sqlite3_realloc64(p->items, more * sizeof *items);
@@ -36,7 +65,8 @@ static int add_place(request *r, const void *bytes, size_t n, bool text, double 
     if (!(eps >= 0)) return fail(error, "%s: eps must be 0 or more; it is %!.15g", what, eps);
     int code = grow(p);
     if (code == SQLITE_OK)
-        code = request_geometry_bytes(r->connection, r->terrain, bytes, n, text, what, &geometry, error);
+        code = request_geometry_bytes(r->connection, r->terrain, bytes, n, text, what, &geometry, &p->transformed,
+                                      error);
     if (code == SQLITE_OK) code = request_region(r, geometry, what, &p->regions[p->count], error);
     rqt_geometry_free(geometry);
     if (code != SQLITE_OK) return code;
@@ -51,6 +81,7 @@ static int read_list(request *r, const cJSON *list, char **error) {
         char what[32];
         sqlite3_snprintf(sizeof what, what, "detail %d", ++n);
         const cJSON *geometry = cJSON_IsArray(pair) ? pair->child : NULL, *eps = geometry ? geometry->next : NULL;
+        /* What is not there is no number. NOLINTNEXTLINE(clang-analyzer-core.NullDereference) */
         if (!cJSON_IsString(geometry) || !cJSON_IsNumber(eps) || eps->next)
             return fail(error, "%s must be [geometry as text, eps]", what);
         code =
@@ -203,24 +234,86 @@ static int read_rows(request *r, const source *s, const char *name, char **error
     return code == SQLITE_DONE ? SQLITE_OK : code;
 }
 
-static int read_table(request *r, const char *name, char **error) {
-    source s = {.db = connection_db(r->connection)};
-    bool exists = false, several = false;
-    int code = find_source(&s, name, &exists);
-    if (code == SQLITE_OK && !exists)
-        code = fail(error, "detail: this connection has no table or view %s", name);
-    else if (code == SQLITE_OK && !s.eps)
-        code = fail(error, "detail: %s has no column eps", name);
-    if (code == SQLITE_OK) code = find_geometry(&s, &several);
+/* ------------------------------------------------------------------------------------------------ keeping -- */
+
+/* What the connection keeps is what the table says now. */
+static bool is_kept(const request *r, const source *s) {
+    const places *p = *connection_places(r->connection);
+    return p && p->state == store_state(r->store) && p->terrain == r->terrain &&
+           strcmp(p->schema, s->schema) == 0 && strcmp(p->table, s->table) == 0;
+}
+
+/* A table with rows of its own, of a database whose changes are seen? Views and virtual tables have no root page.
+ */
+static int has_rows(const source *s, bool *has) {
+    sqlite3_stmt *row = NULL;
+    *has = false;
+    if (sqlite3_stricmp(s->schema, "temp") == 0) return SQLITE_OK;
+    int code = prepare(s->db,
+                       sqlite3_mprintf("SELECT 1 FROM \"%w\".sqlite_schema WHERE type = 'table' AND rootpage > 0 "
+                                       "AND name = %Q COLLATE nocase",
+                                       s->schema, s->table),
+                       &row);
+    if (code == SQLITE_OK) code = sqlite3_step(row);
+    *has = code == SQLITE_ROW;
+    sqlite3_finalize(row);
+    return code == SQLITE_ROW || code == SQLITE_DONE ? SQLITE_OK : code;
+}
+
+/* Keep what was read, if it will be true while nothing changes. */
+static int keep(request *r, const source *s) {
+    places *p = r->places;
+    const uint64_t state = store_state(r->store);
+    size_t bytes = sizeof *p + p->capacity * (sizeof *p->regions + sizeof *p->items);
+    bool own;
+    int code = SQLITE_OK;
+    for (size_t i = 0; i < p->count && bytes <= KEPT_BYTES; i++) bytes += rqt_region_bytes(p->regions[i]);
+    if (state == 0 || p->transformed || bytes > KEPT_BYTES) return SQLITE_OK;
+    if ((code = has_rows(s, &own)) != SQLITE_OK || !own) return code;
+    p->state = state;
+    p->terrain = r->terrain;
+    p->schema = sqlite3_mprintf("%s", s->schema);
+    p->table = sqlite3_mprintf("%s", s->table);
+    if (!p->schema || !p->table) return SQLITE_NOMEM;
+    places **kept = connection_places(r->connection);
+    places_release(*kept);
+    *kept = p;
+    p->holders++;
+    return SQLITE_OK;
+}
+
+/* ------------------------------------------------------------------------------------------------- a table -- */
+
+/* When it is known that the table is there, with a column eps. */
+static int read_source(request *r, source *s, const char *name, char **error) {
+    bool several = false;
+    int code = find_geometry(s, &several);
     if (code == SQLITE_OK && several)
         code = fail(error, "detail: %s has several geometry columns; make a view with one", name);
-    else if (code == SQLITE_OK && !s.geometry)
+    else if (code == SQLITE_OK && !s->geometry)
         code =
             fail(error,
                  "detail: %s has no geometry column: none is registered, declared as one, or named geom, geometry, "
                  "shape or the_geom",
                  name);
-    if (code == SQLITE_OK) code = read_rows(r, &s, name, error);
+    if (code == SQLITE_OK) code = places_create(&r->places);
+    if (code == SQLITE_OK) code = read_rows(r, s, name, error);
+    return code == SQLITE_OK ? keep(r, s) : code;
+}
+
+static int read_table(request *r, const char *name, char **error) {
+    source s = {.db = connection_db(r->connection)};
+    bool exists = false;
+    int code = find_source(&s, name, &exists);
+    if (code == SQLITE_OK && !exists)
+        code = fail(error, "detail: this connection has no table or view %s", name);
+    else if (code == SQLITE_OK && !s.eps)
+        code = fail(error, "detail: %s has no column eps", name);
+    else if (code == SQLITE_OK && is_kept(r, &s)) {
+        r->places = *connection_places(r->connection);
+        r->places->holders++;
+    } else if (code == SQLITE_OK)
+        code = read_source(r, &s, name, error);
     /* what SQLite says of a view that does not work */
     if (code != SQLITE_OK && !*error && (code & 0xFF) != SQLITE_NOMEM && (code & 0xFF) != SQLITE_INTERRUPT) {
         (void)fail(error, "detail: reading %s: %s", name, sqlite3_errmsg(s.db));
@@ -234,11 +327,11 @@ static int read_table(request *r, const char *name, char **error) {
 /* --------------------------------------------------------------------------------------------------- rule -- */
 
 static int read_detail(request *r, char **error) {
-    r->places = sqlite3_malloc(sizeof *r->places);
-    if (!r->places) return SQLITE_NOMEM;
-    *r->places = (places){0};
-    if (cJSON_IsArray(r->detail)) return read_list(r, r->detail, error);
     if (cJSON_IsString(r->detail)) return read_table(r, r->detail->valuestring, error);
+    if (cJSON_IsArray(r->detail)) {
+        const int code = places_create(&r->places);
+        return code == SQLITE_OK ? read_list(r, r->detail, error) : code;
+    }
     return fail(error, "option \"detail\" must be a list of [geometry as text, eps], or the name of a table");
 }
 
@@ -285,11 +378,6 @@ double rule_least_eps(const request *r) {
 
 void rule_free(request *r) {
     rqt_rule_free(r->options.rule);
-    for (size_t i = 0; r->places && i < r->places->count; i++) rqt_region_free(r->places->regions[i]);
-    if (r->places) {
-        sqlite3_free(r->places->regions);
-        sqlite3_free(r->places->items);
-    }
-    sqlite3_free(r->places);
+    places_release(r->places);
     cJSON_Delete(r->detail);
 }

@@ -16,6 +16,11 @@ sqlite3 *connection_db(const connection *c);
  */
 int connection_store(connection *c, store **s, char **error);
 void connection_done(connection *c);
+/* Places of a table that the connection keeps for the next request, NULL: none. Counted; detail.c knows what they
+ * hold and how long they are true. */
+typedef struct places places;
+places **connection_places(connection *c);
+void places_release(places *p); /* NULL is fine */
 
 /* ------------------------------------------------------------------------------------------- functions */
 /* The rows of one call of a table-valued function. */
@@ -78,7 +83,7 @@ typedef struct request {
     double eps;
     store_query_options options;
     struct cJSON *detail;  /* the option, as it came; NULL: none */
-    struct places *places; /* what it says; detail.c */
+    places *places;        /* what it says; detail.c */
     frame_kind frame_kind; /* where the mesh is drawn */
     space_frame *frame;    /* NULL for FRAME_CRS; frame.c */
     bool fans;             /* the strip goes round the centres of blocks */
@@ -125,9 +130,9 @@ int request_terrain(store *s, sqlite3_value *name, const store_terrain **terrain
  * Release with rqt_geometry_free. geometry.c */
 int request_geometry(connection *c, const store_terrain *t, sqlite3_value *value, const char *what,
                      rqt_geometry **geometry, char **error);
-/* The same of n bytes of text or of a BLOB. */
+/* The same of n bytes of text or of a BLOB. *transformed (may be NULL) becomes true when it was, else stays. */
 int request_geometry_bytes(connection *c, const store_terrain *t, const void *bytes, size_t n, bool text,
-                           const char *what, rqt_geometry **geometry, char **error);
+                           const char *what, rqt_geometry **geometry, bool *transformed, char **error);
 /* "what must be a number ...": false and a sentence when the value is none, or NaN. */
 bool request_number(sqlite3_value *value, const char *what, double *number, char **error);
 /* The lines of a geometry (points are lines of one point), for functions that want a line: line i has counts[i]

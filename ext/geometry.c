@@ -101,7 +101,7 @@ static int transform(sqlite3 *db, const store_terrain *t, const char *what, rqt_
 }
 
 int request_geometry_bytes(connection *c, const store_terrain *t, const void *bytes, size_t n, bool text,
-                           const char *what, rqt_geometry **geometry, char **error) {
+                           const char *what, rqt_geometry **geometry, bool *transformed, char **error) {
     *geometry = NULL;
     int code = parse(bytes, n, text, what, geometry, error);
     if (code != SQLITE_OK) return code;
@@ -109,6 +109,7 @@ int request_geometry_bytes(connection *c, const store_terrain *t, const void *by
     if (srid == 0 || srid == t->srid || (srid == 4326 && t->wgs84) || rqt_geometry_is_empty(*geometry))
         return SQLITE_OK;
     code = transform(connection_db(c), t, what, geometry, error);
+    if (transformed) *transformed = true;
     if (code != SQLITE_OK) {
         rqt_geometry_free(*geometry);
         *geometry = NULL;
@@ -126,5 +127,5 @@ int request_geometry(connection *c, const store_terrain *t, sqlite3_value *value
     const void *bytes = type == SQLITE_TEXT ? (const void *)sqlite3_value_text(value) : sqlite3_value_blob(value);
     const size_t n = (size_t)sqlite3_value_bytes(value);
     if (!bytes && n > 0) return SQLITE_NOMEM;
-    return request_geometry_bytes(c, t, bytes, n, type == SQLITE_TEXT, what, geometry, error);
+    return request_geometry_bytes(c, t, bytes, n, type == SQLITE_TEXT, what, geometry, NULL, error);
 }

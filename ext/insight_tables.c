@@ -156,6 +156,7 @@ static const char *reason_of(const explanation *e, const store_read *read) {
          "answers every eps and border in its reach; it only touches the region, so its index row is enough",
          "answers every eps and border in its reach; nothing is selected inside, so its index row is enough",
          "answers every eps and border in its reach; made in memory, for the metric is not stored, and walked",
+         /* One sentence. NOLINTNEXTLINE(bugprone-suspicious-missing-comma) */
          "answers every eps and border in its reach; made in memory, for the metric is not stored; nothing is "
          "selected inside"}};
     const int which = read->computed ? (read->needs_bytes ? 3 : 4) : read->needs_bytes ? 0 : read->outside ? 1 : 2;

@@ -41,7 +41,7 @@ if cppcheck --enable=warning,performance,portability --inline-suppr --quiet -j 2
 else
     failed=$((failed + 1))
     echo "FAILED cppcheck"
-    grep -E '(error|warning|performance|portability): ' "$logs/cppcheck.log" | sed 's/^/    /' | sort -u
+    grep -E '(error|warning|style|performance|portability): ' "$logs/cppcheck.log" | sed 's/^/    /' | sort -u
 fi
 echo "$passed passed, $failed failed"
 [ "$failed" = 0 ]

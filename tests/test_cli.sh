@@ -155,6 +155,12 @@ blocks='SELECT id, hex(summary), hex(data) FROM rqt_block_1'
 prints "update: the same again writes nothing" "nothing written" update patch.asc updated.gpkg
 rqt update back.asc updated.gpkg
 [ "$(sqlite3 updated.gpkg "$blocks" | md5sum)" = "$(sqlite3 original.gpkg "$blocks" | md5sum)" ]; ok "update back restores the blocks" $?
+mkdir -p delivery/deeper && cp patch.asc delivery/deeper && echo notes >delivery/readme.txt
+rqt update delivery updated.gpkg; grep -q "80 of them differ" out; ok "update takes a folder" $? "$(cat out err)"
+printf '# back\n\nback.asc\n' >back.txt
+rqt update @back.txt updated.gpkg; grep -q "80 of them differ" out; ok "update takes a list" $? "$(cat out err)"
+echo nothing.tif >>back.txt
+refuses "update: a list names the line of what is missing" 1 "back.txt, line 4: nothing.tif: No such file" update @back.txt updated.gpkg
 
 # ----------------------------------------------------------------------------------------------------- info, check
 for c in info check verify mesh; do refuses "$c: no database" 2 "a database is missing" $c; done
@@ -244,6 +250,7 @@ ln -s t.gpkg link.gpkg
 refuses "mesh: the database by another name" 2 "is the database itself" $M --eps 1 -o link.gpkg
 mkdir folder.obj
 refuses "mesh: a folder" 2 "is a folder" $M --eps 1 -o folder.obj
+mkfifo pipe.obj; refuses "mesh: a device" 2 "is a device" $M --eps 1 -o pipe.obj
 refuses "mesh: a folder that is not there" 1 "cannot be written" $M --eps 1 -o nowhere/a.obj
 for kind in obj ply gpkg svg png; do
     refuses "mesh: unknown terrain, .$kind" 1 "nobody" mesh t.gpkg --terrain nobody --eps 1 -o "a.$kind"

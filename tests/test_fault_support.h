@@ -66,11 +66,20 @@ static inline file_path path_of(const char *name) {
     return p;
 }
 
-/* A new database with that terrain. */
+/* A new database with that terrain, and a table for the option detail. */
 static inline file_path demo_database(const char *name) {
     const import_options o = demo_options();
     const file_path database = path_of(name);
     import_fine(demo_raster("demo.tif", 0), database.text, &o);
+    sqlite3 *db = NULL;
+    assert_int_equal(sqlite3_open(database.text, &db), SQLITE_OK);
+    assert_int_equal(sqlite3_exec(db,
+                                  "CREATE TABLE places(geom TEXT, eps REAL);"
+                                  "INSERT INTO places VALUES ('POINT(-71.35 44.25)', 1), "
+                                  "('LINESTRING(-71.4 44.2, -71.3 44.3)', 3.5)",
+                                  NULL, NULL, NULL),
+                     SQLITE_OK);
+    assert_int_equal(sqlite3_close(db), SQLITE_OK);
     return database;
 }
 
@@ -93,6 +102,17 @@ static const char *const further_statements[] = {
     "SELECT r.error, t.name FROM rqt_terrains t, rqt_range('POINT(-71.4 44.2)', 1, t.name) r",
     "SELECT * FROM rqt_verify(NULL, 2)",
     "SELECT level, extent, why, bytes, selected FROM rqt_explain(NULL, 2)", /* cached is no part of the answer */
+    "SELECT * FROM rqt_range(NULL, 30, NULL, '{\"detail\":[[\"POINT(-71.35 44.25)\",1],"
+    "[\"POLYGON((-71.4 44.2, -71.3 44.2, -71.3 44.3, -71.4 44.2))\",3]]}')",
+    "SELECT * FROM rqt_range(NULL, 30, NULL, '{\"detail\":\"places\"}')",
+    "SELECT * FROM rqt_verify(NULL, 30, NULL, '{\"detail\":\"main.places\",\"mode\":\"border\"}')",
+    "SELECT * FROM rqt_triangles('POLYGON((-71.4 44.2, -71.3 44.2, -71.3 44.3, -71.4 44.2))', 30, NULL, "
+    "'{\"mode\":\"cut\"}')",
+    "SELECT * FROM rqt_triangles('POINT(-71.3501 44.2501)', 30, NULL, '{\"mode\":\"snap\",\"outline\":\"tol\"}')",
+    "SELECT rqt_mesh(rqt_bbox(-71.4, 44.2, -71.3, 44.3), 30, 'obj', NULL, '{\"frame\":\"ecef\"}')",
+    "SELECT * FROM rqt_range(rqt_bbox(-71.4, 44.2, -71.3, 44.3), 30, NULL, '{\"frame\":\"enu\"}')",
+    "SELECT rqt_mesh(rqt_bbox(-71.4, 44.2, -71.3, 44.3), 30, 'ply+normals')",
+    "SELECT rqt_mesh(rqt_bbox(-71.4, 44.2, -71.3, 44.3), 30, 'rqt+normals')",
 };
 
 static inline int statement_count(void) {

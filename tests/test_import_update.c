@@ -254,6 +254,52 @@ static void a_later_source_wins_and_provenance_says_what_was_put_in(void **unuse
     sqlite3_free(after);
 }
 
+/* A folder's rasters go in in the order of their paths; those that are no terrain's or lie elsewhere are passed
+ * over.
+ */
+static void folders_and_lists_are_taken_as_imports_take_them(void **unused) {
+    (void)unused;
+    import_options o = defaults();
+    const char *database = file("t.gpkg");
+    assert_int_equal(mkdir(file("in"), 0777) | mkdir(file("in/deep"), 0777) | mkdir(file("away"), 0777), 0);
+    shifted_window("in/b.tif", 20, 20, GDT_Int16, 0, 100);
+    shifted_window("in/a.tif", 0, 0, GDT_Int16, 0, 0);
+    shifted_window("in/deep/c.tif", 200, 100, GDT_Int16, 0, 50);
+    shifted_window("away/d.tif", 40000, 0, GDT_Int16, 0, 0);
+    assert_int_equal(CPLCopyFile(file("in/far.tif"), file("away/d.tif")), 0);
+    const double colours[3] = {1, 2, 3};
+    write_raster(&(raster){.name = "in/colours.tif", .width = 1, .height = 1, .bands = 3, .type = GDT_Byte},
+                 colours);
+    FILE *list = fopen(file("list.txt"), "w");
+    assert_non_null(list);
+    fputs("# what came in May\n\nin\n", list);
+    fclose(list);
+    char argument[300];
+    snprintf(argument, sizeof argument, "@%s", file("list.txt"));
+    const char *const sources[] = {file("in"), argument};
+    for (int round = 0; round < 2; round++) {
+        unlink(database);
+        import_small(database, &o);
+        notices[0] = 0;
+        for (int i = 0; i < 20; i++) heights[i / 5 * 40 + i % 5] = 300 + i;
+        for (int i = 0; i < 20; i++) heights[(i / 5 + 2) * 40 + i % 5 + 2] = 400 + i;
+        for (int i = 0; i < 20; i++) heights[(i / 5 + 10) * 40 + i % 5 + 20] = 350 + i;
+        if (update_many(&sources[round], 1, database, &o, false)) fail_msg("%s", message);
+        assert_int_equal(updated.samples, 60);
+        expect_file_metres(database, heights);
+        if (!strstr(notices, "colours.tif is passed over: it has 3 bands")) fail_msg("%s", notices);
+        if (!strstr(notices, "1 raster in folders lies outside terrain")) fail_msg("%s", notices);
+    }
+    terrain r = open_terrain(database, NULL);
+    assert_string_equal(r.t->source, "small.tif\na.tif\nb.tif\nc.tif");
+    close_terrain(&r);
+    expect_sound(database);
+    update_refused(file("away"), database, &o, "away holds no raster of one band that meets terrain");
+    update_refused(file("away/d.tif"), database, &o, "lies outside terrain");
+    assert_int_equal(mkdir(file("empty"), 0777), 0);
+    update_refused(file("empty"), database, &o, "empty is a folder without rasters");
+}
+
 static void heights_keep_the_terrains_unit_and_steps(void **unused) {
     (void)unused;
     import_options o = defaults();
@@ -552,6 +598,7 @@ int main(void) {
         TEST(what_does_not_fit_is_refused_with_a_sentence),
         TEST(what_lies_outside_is_left_out_and_told),
         TEST(a_later_source_wins_and_provenance_says_what_was_put_in),
+        TEST(folders_and_lists_are_taken_as_imports_take_them),
         TEST(heights_keep_the_terrains_unit_and_steps),
         TEST(a_long_window_goes_in_parts),
         TEST(stored_minimal_errors_are_made_anew),

@@ -110,6 +110,90 @@ equal("a temporary table hides another one", mesh(db, None, EPS, detail="roads")
 equal("the one that SpatiaLite knows is taken", mesh(db, None, EPS, detail="other.tracks"), detailed)
 db.execute("DROP TABLE temp.roads")
 
+# What a connection keeps of a table is never old. `same` asks twice, so that the second answer may be a kept one.
+def same(title, table, given, connection=None):
+    expected = mesh(db, None, EPS, detail=[list(p) for p in given])
+    for turn in ("", ", kept"):
+        equal("kept places: " + title + turn, mesh(connection or db, None, EPS, detail=table), expected)
+
+
+db.execute("CREATE TABLE lanes(geom, eps)")
+db.executemany("INSERT INTO lanes VALUES(?, ?)", places)
+db.commit()
+same("a table as it is", "lanes", places)
+db.execute("DELETE FROM lanes WHERE eps = 9")
+same("a row is gone, before the commit", "lanes", places[:1] + places[2:])
+db.commit()
+same("a row is gone", "lanes", places[:1] + places[2:])
+db.execute("BEGIN")
+db.execute("INSERT INTO lanes VALUES(?, ?)", places[1])
+same("an inserted row, to be rolled back", "lanes", places)
+db.rollback()
+same("rolled back", "lanes", places[:1] + places[2:])
+db.execute("BEGIN")
+db.execute("UPDATE lanes SET eps = 1")
+db.rollback()
+same("rolled back, not asked meanwhile", "lanes", places[:1] + places[2:])
+db.execute("UPDATE lanes SET eps = 5 WHERE eps = 2.5")
+db.commit()
+same("an eps is another", "lanes", [(places[0][0], 5)] + places[2:])
+other = s.connect(database)
+same("another connection", "lanes", [(places[0][0], 5)] + places[2:], other)
+db.execute("UPDATE lanes SET eps = 2.5 WHERE eps = 5")
+db.commit()
+same("another connection has committed", "lanes", places[:1] + places[2:], other)
+other.execute("DELETE FROM lanes WHERE eps > 0")
+other.commit()
+same("... and this one", "lanes", places[2:3])
+other.close()
+db.execute("CREATE TEMP TABLE lanes(geom, eps)")
+same("a table of temp hides it", "lanes", [])
+same("the hidden one has its name", "main.lanes", places[2:3])
+db.execute("INSERT INTO temp.lanes VALUES(?, ?)", places[0])
+same("a row of temp", "lanes", places[:1])
+db.commit()
+db.execute("UPDATE temp.lanes SET eps = 9")
+db.commit()
+same("temp changes unseen", "lanes", [(places[0][0], 9)])
+db.execute("DROP TABLE temp.lanes")
+same("nothing hides it", "lanes", places[2:3])
+db.execute("DROP TABLE lanes")
+db.commit()
+raises("kept places: a table that is gone", "rqt_triangles(): detail: this connection has no table or view lanes", lambda: mesh(db, None, EPS, detail="lanes"))
+for given in (places[:1], places[1:2]):
+    db.execute("ATTACH ':memory:' AS passing")
+    db.execute("CREATE TABLE passing.lanes(geom, eps)")
+    db.executemany("INSERT INTO passing.lanes VALUES(?, ?)", given)
+    db.commit()
+    same("a database that comes and goes", "lanes", given)
+    db.execute("DETACH passing")
+said = [9]
+db.create_function("said", 0, lambda: said[0])
+db.execute("CREATE TEMP VIEW spoken AS SELECT the_geom AS geom, said() AS eps FROM main.roads WHERE eps = 9")
+db.execute("CREATE VIEW lanes AS SELECT * FROM roads WHERE eps = 9")
+db.commit()
+same("a view", "lanes", places[1:2])
+same("a view over a function", "spoken", places[1:2])
+said[0] = 2.5
+same("... that says something else", "spoken", [(places[1][0], 2.5)])
+db.execute("DROP VIEW lanes")
+db.commit()
+# SQLite tells an authorizer which columns are read, when a statement is made.
+db.execute("CREATE TABLE lanes(geom, eps)")
+db.executemany("INSERT INTO lanes VALUES(?, ?)", places)
+db.commit()
+read = []
+db.set_authorizer(lambda action, a, b, c, d: read.append((a, b)) or 0)
+counts = []
+for turn in range(3):
+    del read[:]
+    equal("kept places: of a table that has not changed", mesh(db, None, EPS, detail="lanes"), detailed)
+    counts.append(read.count(("lanes", "geom")))
+db.set_authorizer(None)
+equal("kept places: a table that has not changed is read once", counts, [1, 0, 0])
+db.execute("DROP TABLE lanes")
+db.commit()
+
 # ----------------------------------------------------------------------------------------------------------- border
 def half_cells(inside):
     """Half cells with three valid corners whose centre of gravity is inside; twice the area in cells."""

@@ -3,7 +3,6 @@
 import json
 import os
 import re
-import shutil
 import sqlite3
 
 import sql_support as s
@@ -173,19 +172,4 @@ equal("what import creates is a GeoPackage, in journal mode delete", (one(fresh,
 equal("its terrains are registered as attributes", rows(fresh, "SELECT table_name, data_type FROM gpkg_contents ORDER BY 1"),
       [("rqt_block_1", "attributes"), ("rqt_terrain", "attributes")])
 fresh.close()
-
-# ----------------------------------------------------------------------------------------------- a folder of tiles
-folder = s.temp("tiles")
-os.mkdir(folder)
-for tile in ("N42E001.hgt.zip", "N41E001.hgt.zip"):
-    shutil.copy(os.path.join(s.ROOT, "tests", "data", tile), folder)
-script = os.path.join(s.ROOT, "examples", "import.sh")
-path_to_rqt = {"PATH": os.path.dirname(s.RQT) + ":" + os.environ["PATH"]}
-said, status = s.run(["bash", script, folder, s.temp("tiles.gpkg"), "pyrenees"], path_to_rqt)
-check("examples/import.sh makes one terrain of a folder", status == 0 and "1 201 samples in more than one source, 0 of them differ" in said, said)
-d2 = s.connect(s.temp("tiles.gpkg"))
-equal("... with both tiles in it", rows(d2, "SELECT name, width, height FROM rqt_terrains"), [("pyrenees", 1201, 2401)])
-d2.close()
-said, status = s.run(["bash", script, s.temp("nothing"), s.temp("x.gpkg")], path_to_rqt)
-check("... and says so when there is no folder", status == 1 and "is no folder" in said, said)
 s.finish()

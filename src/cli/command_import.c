@@ -1,6 +1,5 @@
 /* command_import.c - rqt import: options, progress and the report around import_run. */
-#include "cli.h"
-#include "import.h"
+#include "command_sources.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -89,24 +88,6 @@ static const struct option OPTIONS[] = {{"name", required_argument, NULL, NAME},
                                         {"help", no_argument, NULL, 'h'},
                                         {NULL, 0, NULL, 0}};
 
-/* Set by Ctrl-C (and by a polite kill); the progress callback hands it on, and the import rolls back. */
-static volatile sig_atomic_t stopped;
-
-static void stop(int number) {
-    (void)number;
-    stopped = 1;
-}
-
-static bool on_progress(void *context, const char *stage, double done, int64_t samples) {
-    cli_progress_show(context, stage, done, samples);
-    return !stopped;
-}
-
-static void on_notice(void *context, const char *sentence) {
-    cli_progress_wipe(context);
-    cli_say("%s", sentence);
-}
-
 /* CLI_OK, or CLI_USAGE after a sentence. */
 static int set_option(import_options *o, int option) {
     int64_t n;
@@ -124,20 +105,9 @@ static int set_option(import_options *o, int option) {
         o->k = (int)n;
         return CLI_OK;
     case NODATA:
-        /* Values like -3.4028235e38 and nan mark voids in real rasters. */
-        if (!cli_number(optarg, &number)) {
-            if (strcasecmp(optarg, "nan")) return cli_usage("--nodata %s is not a number", optarg);
-            number = (double)NAN;
-        }
-        o->has_nodata = true;
-        o->nodata = number;
-        return CLI_OK;
+        return sources_set_nodata(o);
     case UNIT:
-        if (strcmp(optarg, "m") && strcmp(optarg, "ft") && strcmp(optarg, "us-ft") &&
-            !(cli_number(optarg, &number) && number > 0))
-            return cli_usage("--unit %s: m, ft, us-ft or a number of metres", optarg);
-        o->unit = optarg;
-        return CLI_OK;
+        return sources_set_unit(o);
     case QUANTUM:
         if (!cli_number(optarg, &number) || number <= 0)
             return cli_usage("--quantum %s is no height step: a number above 0", optarg);
@@ -227,17 +197,7 @@ static int run(int argc, char **argv) {
         return cli_usage(argc == optind ? "a source and a database are missing"
                                         : "the database is missing: rqt import SOURCE... DATABASE");
     cli_progress progress;
-    cli_progress_begin(&progress);
-    options.progress = on_progress;
-    options.notice = on_notice;
-    options.context = &progress;
-
-    /* The second Ctrl-C ends the process as usual: SQLite rolls back when the database is next opened. */
-    const struct sigaction action = {.sa_handler = stop, .sa_flags = (int)SA_RESETHAND};
-    sigaction(SIGINT, &action, NULL);
-    sigaction(SIGTERM, &action, NULL);
-    /* A limit on the size of files (ulimit -f) is a full disk, of which we and SQLite know how to tell. */
-    signal(SIGXFSZ, SIG_IGN);
+    sources_watch(&options, &progress);
 
     import_report report;
     char message[2048];

@@ -1,8 +1,6 @@
 /* command_update.c - rqt update: options, progress and the report around import_update. */
-#include "cli.h"
-#include "import.h"
+#include "command_sources.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -11,11 +9,17 @@ static const char HELP[] =
     "\n"
     "Usage: rqt update [OPTION...] SOURCE... DATABASE\n"
     "\n"
-    "SOURCE is whatever GDAL reads. It has the terrain's CRS and lies on its grid: the same cells, a whole number "
-    "of\n"
-    "them away. What lies outside the terrain is left out. Where its samples are void the terrain keeps what it "
-    "has.\n"
-    "Several sources are put in one after the other: a later one wins.\n"
+    "SOURCE is whatever GDAL reads; or a folder, of which all rasters are taken that meet the terrain, those in "
+    "its\n"
+    "folders too, in the order of their paths; or @FILE, a list of them, one a line, as seen from the list. Each "
+    "has "
+    "the\n"
+    "terrain's CRS and lies on its grid: the same cells, a whole number of them away. What lies outside the "
+    "terrain "
+    "is\n"
+    "left out. Where samples are void the terrain keeps what it has. Several sources are put in one after the "
+    "other: a\n"
+    "later one wins.\n"
     "\n"
     "Heights are kept in the terrain's unit and steps. Where the terrain holds its heights without rounding, one "
     "that\n"
@@ -37,6 +41,7 @@ static const char HELP[] =
     "\n"
     "Examples:\n"
     "  rqt update landslide.tif county.gpkg\n"
+    "  rqt update delivery-2024/ country.gpkg\n"
     "  rqt update --terrain lidar --nodata -9999 flight-17.tif flight-18.tif county.gpkg\n"
     "  gdal_translate -srcwin 100 200 64 64 county.tif old.tif && rqt update --voids old.tif county.gpkg\n";
 
@@ -49,27 +54,8 @@ static const struct option OPTIONS[] = {{"terrain", required_argument, NULL, TER
                                         {"help", no_argument, NULL, 'h'},
                                         {NULL, 0, NULL, 0}};
 
-/* Set by Ctrl-C (and by a polite kill); the progress callback hands it on, and the update rolls back. */
-static volatile sig_atomic_t stopped;
-
-static void stop(int number) {
-    (void)number;
-    stopped = 1;
-}
-
-static bool on_progress(void *context, const char *stage, double done, int64_t samples) {
-    cli_progress_show(context, stage, done, samples);
-    return !stopped;
-}
-
-static void on_notice(void *context, const char *sentence) {
-    cli_progress_wipe(context);
-    cli_say("%s", sentence);
-}
-
 /* CLI_OK, or CLI_USAGE after a sentence. */
 static int set_option(import_options *o, bool *voids, int option) {
-    double number;
     switch (option) {
     case TERRAIN:
         o->name = optarg;
@@ -78,19 +64,9 @@ static int set_option(import_options *o, bool *voids, int option) {
         *voids = true;
         return CLI_OK;
     case NODATA:
-        if (!cli_number(optarg, &number)) {
-            if (strcasecmp(optarg, "nan")) return cli_usage("--nodata %s is not a number", optarg);
-            number = (double)NAN;
-        }
-        o->has_nodata = true;
-        o->nodata = number;
-        return CLI_OK;
+        return sources_set_nodata(o);
     case UNIT:
-        if (strcmp(optarg, "m") && strcmp(optarg, "ft") && strcmp(optarg, "us-ft") &&
-            !(cli_number(optarg, &number) && number > 0))
-            return cli_usage("--unit %s: m, ft, us-ft or a number of metres", optarg);
-        o->unit = optarg;
-        return CLI_OK;
+        return sources_set_unit(o);
     default:
         return CLI_USAGE; /* cli_option has said why */
     }
@@ -121,17 +97,7 @@ static int run(int argc, char **argv) {
         return cli_usage(argc == optind ? "a source and a database are missing"
                                         : "the database is missing: rqt update SOURCE... DATABASE");
     cli_progress progress;
-    cli_progress_begin(&progress);
-    options.progress = on_progress;
-    options.notice = on_notice;
-    options.context = &progress;
-
-    /* The second Ctrl-C ends the process as usual: SQLite rolls back when the database is next opened. */
-    const struct sigaction action = {.sa_handler = stop, .sa_flags = (int)SA_RESETHAND};
-    sigaction(SIGINT, &action, NULL);
-    sigaction(SIGTERM, &action, NULL);
-    /* A limit on the size of files (ulimit -f) is a full disk, of which we and SQLite know how to tell. */
-    signal(SIGXFSZ, SIG_IGN);
+    sources_watch(&options, &progress);
 
     import_update_report report;
     char message[2048];

@@ -140,7 +140,7 @@ char *cli_region(const char *text) {
     if (*at && (isdigit((unsigned char)*at) || strchr("+-.", *at))) {
         double box[4];
         for (int i = 0; i < 4; i++) {
-            const bool ends_well = list_number(&at, &box[i]) && (i < 3 ? *at == ',' : !*at);
+            const bool ends_well = list_number(&at, &box[i]) && *at == (i < 3 ? ',' : '\0');
             if (!ends_well) {
                 cli_usage("--region %s is not x0,y0,x1,y1: four numbers with commas", text);
                 return NULL;

@@ -43,6 +43,9 @@ int cli_output_begin(cli_output *output, const char *path, const char *forbidden
         if (S_ISDIR(file.st_mode)) {
             return cli_usage("%s is a folder; -o names a file", path);
         }
+        if (!S_ISREG(file.st_mode)) { /* the file would take the place of the device */
+            return cli_usage("%s is a device; -o names a file", path);
+        }
         if (stat(forbidden, &other) == 0 && file.st_dev == other.st_dev && file.st_ino == other.st_ino) {
             return cli_usage("%s is the database itself; -o names another file", path);
         }

@@ -2,9 +2,10 @@
  *
  * Leaf by leaf. One that no piece of the region's border touches stays whole: it lies inside, or it would not be in
  * the patch. Any other becomes a small triangulation of its own (cut_faces.c) in which the pieces that pass through
- * it are unions of edges, and each of its faces is asked by an inner point whether the region holds it. That is
- * all: faces never overlap and share whole edges, so whichever of them are taken, the mesh has neither overlaps nor
- * T-junctions, and a region's holes, bow-ties and overlapping members need no thought.
+ * it are unions of edges. Faces that no border parts are held by the region together or not at all: an inner point
+ * of the largest of them is asked. That is all: faces never overlap and share whole edges, so whichever of them are
+ * taken, the mesh has neither overlaps nor T-junctions, and a region's holes, bow-ties and overlapping members need
+ * no thought.
  *
  * Between leaves. A point on a leaf's side belongs to the neighbour too, which may not be crossed otherwise. So the
  * place where a piece meets a side depends on the piece and the side alone, the side taken from its lesser end:
@@ -30,6 +31,12 @@ typedef struct kept_place {
     uint32_t vertex; /* NO_VERTEX: free */
 } kept_place;
 
+/* The ends of what the leaf has of a piece; count < 2: nothing that could divide it. */
+typedef struct passage {
+    uint32_t point[8];
+    int count;
+} passage;
+
 typedef struct cutting {
     const rqt_patch *patch;
     const rqt_region *region;
@@ -42,7 +49,15 @@ typedef struct cutting {
     uint8_t *sides;    /* by point: the side of the leaf that it lies on; INSIDE: none */
     uint32_t *numbers; /* by point: its vertex, NO_VERTEX: not yet asked for */
     size_t side_count, side_capacity, number_capacity;
+    bool *held;     /* by face: the region holds it */
+    uint32_t *part; /* faces that no border parts */
+    size_t held_capacity, part_capacity;
     region_pieces near; /* pieces that touch the leaf */
+    passage *ways;      /* of each of them through the leaf */
+    size_t way_capacity;
+    bool (*is_interrupted)(void *context);
+    void *context;
+    bool stopped;
     kept_place *places;
     size_t place_count, place_size; /* a power of two */
 } cutting;
@@ -237,6 +252,7 @@ static int meet_side(const cutting *c, const region_piece *piece, rqt_vertex u, 
     const int64_t longer = wide > high ? wide : high, step = wide == 0 || high == 0 || wide == high ? longer : 1;
     /* `step` is how much finer than 2^-G of the side the grid is along it */
     const int64_t share = (int64_t)cut_share((uint64_t)step << c->grid, from, from + to);
+    /* A side has a length. NOLINTNEXTLINE(clang-analyzer-core.DivideZero) */
     at[0] = (region_point){((int64_t)u.x << c->grid) + across / step * share,
                            ((int64_t)u.y << c->grid) + down / step * share};
     return 1;
@@ -259,12 +275,6 @@ static bool add_point(cutting *c, region_point place, int side, uint32_t *point)
     c->sides[*point] = (uint8_t)side;
     return true;
 }
-
-/* The ends of what the leaf has of a piece; *count < 2: nothing that could divide it. */
-typedef struct passage {
-    uint32_t point[8];
-    int count;
-} passage;
 
 static bool add_side_points(cutting *c, const leaf *l, const region_piece *piece, passage *way) {
     for (int i = 0; i < 3; i++) {
@@ -310,24 +320,30 @@ static void order_passage(const cutting *c, const region_piece *piece, passage *
     }
 }
 
+/* Now and then, where a leaf takes long. */
+static bool goes_on(cutting *c, size_t step) {
+    if (step % 1024 == 1023 && c->is_interrupted && c->is_interrupted(c->context)) c->stopped = true;
+    return !c->stopped;
+}
+
 /* Points first, of all pieces, then the edges between them: a side of the leaf is whole while it gets its points.
  */
 static bool divide(cutting *c, const leaf *l) {
-    if (!cut_faces_begin(&c->faces, l->at)) return false;
+    if (!cut_faces_begin(&c->faces, l->at) ||
+        !memory_grow(c->allocator, (void **)&c->ways, &c->way_capacity, c->near.count, sizeof *c->ways))
+        return false;
     c->side_count = 0;
-    passage way;
     for (size_t i = 0; i < c->near.count; i++) {
-        way.count = 0;
-        if (!add_side_points(c, l, &c->near.items[i], &way)) return false;
+        c->ways[i].count = 0;
+        if (!goes_on(c, i) || !add_side_points(c, l, &c->near.items[i], &c->ways[i])) return false;
     }
     for (size_t i = 0; i < c->near.count; i++) {
         const region_piece *piece = &c->near.items[i];
-        way.count = 0;
-        if (!add_side_points(c, l, piece, &way) || !add_inner_end(c, l, piece->a, &way) ||
-            !add_inner_end(c, l, piece->b, &way))
+        passage *way = &c->ways[i];
+        if (!goes_on(c, i) || !add_inner_end(c, l, piece->a, way) || !add_inner_end(c, l, piece->b, way))
             return false;
-        order_passage(c, piece, &way);
-        if (way.count >= 2 && !cut_faces_fix(&c->faces, way.point[0], way.point[way.count - 1])) return false;
+        order_passage(c, piece, way);
+        if (way->count >= 2 && !cut_faces_fix(&c->faces, way->point[0], way->point[way->count - 1])) return false;
     }
     return note_points(c);
 }
@@ -342,15 +358,67 @@ static bool holds_face(const cutting *c, const cut_face *face) {
     return region_holds(c->region, &inner);
 }
 
+static double area_of(const cutting *c, uint32_t face) {
+    const uint32_t *corner = c->faces.faces[face].corner;
+    const region_point *p = c->faces.points;
+    return (double)region_side(p[corner[0]], p[corner[1]], p[corner[2]]);
+}
+
+/* From one face over edges without a border to all that are held together. Rounding has moved borders by a unit or
+ * so: the largest face knows best. */
+static void ask_part(cutting *c, uint32_t first) {
+    const uint32_t stamp = c->faces.mark;
+    cut_face *faces = c->faces.faces;
+    size_t count = 0;
+    uint32_t largest = first;
+    double most = area_of(c, first);
+    faces[first].mark = stamp;
+    c->part[count++] = first;
+    for (size_t n = 0; n < count; n++) {
+        const cut_face *t = &faces[c->part[n]];
+        const double area = area_of(c, c->part[n]);
+        if (area > most) {
+            most = area;
+            largest = c->part[n];
+        }
+        if (!c->faces.is_sound) break; /* a border is not an edge everywhere: each face for itself */
+        for (int i = 0; i < 3; i++) {
+            const uint32_t next = t->next[i];
+            if (t->fixed[i] || next == CUT_NO_FACE || faces[next].mark == stamp) continue;
+            faces[next].mark = stamp;
+            c->part[count++] = next;
+        }
+    }
+    const bool held = holds_face(c, &faces[largest]);
+    for (size_t n = 0; n < count; n++) c->held[c->part[n]] = held;
+}
+
+/* Which faces the region holds. */
+static bool ask_faces(cutting *c, const leaf *l) {
+    const size_t n = c->faces.face_count;
+    if (!memory_grow(c->allocator, (void **)&c->held, &c->held_capacity, n, sizeof *c->held) ||
+        !memory_grow(c->allocator, (void **)&c->part, &c->part_capacity, n, sizeof *c->part))
+        return false;
+    const bool all = region_thin_touches(c->region, &l->shape);
+    c->faces.mark++;
+    for (uint32_t i = 0; i < n; i++) {
+        if (!goes_on(c, i)) return false;
+        if (all)
+            c->held[i] = true;
+        else if (c->faces.faces[i].mark != c->faces.mark)
+            ask_part(c, i);
+    }
+    return true;
+}
+
 static bool cut_leaf(cutting *c, const leaf *l) {
-    if (!divide(c, l)) return false;
+    if (!divide(c, l) || !ask_faces(c, l)) return false;
     const size_t n = c->faces.point_count;
     if (!memory_grow(c->allocator, (void **)&c->numbers, &c->number_capacity, n, sizeof *c->numbers)) return false;
     for (size_t i = 0; i < n; i++) c->numbers[i] = NO_VERTEX;
-    const bool all = region_thin_touches(c->region, &l->shape);
     for (size_t i = 0; i < c->faces.face_count; i++) {
         const cut_face *face = &c->faces.faces[i];
-        if (!all && !holds_face(c, face)) continue;
+        if (!c->held[i]) continue;
         uint32_t number[3];
         for (int k = 0; k < 3; k++)
             if (!take_point(c, l, face->corner[k], &number[k])) return false;
@@ -374,12 +442,15 @@ static bool find_pieces(cutting *c, const region_triangle *shape) {
 static bool cut_triangle(cutting *c, const uint32_t triangle[3]) {
     leaf l = {.corner = {triangle[0], triangle[2], triangle[1]}};
     rqt_vertex at[3];
+    region_box box = {INT64_MAX, INT64_MAX, 0, 0};
     for (int i = 0; i < 3; i++) {
         const rqt_patch_vertex *v = &c->patch->vertices[l.corner[i]];
+        const region_point p = {v->col * REGION_UNIT, v->row * REGION_UNIT};
         at[i] = (rqt_vertex){v->col, v->row};
+        region_box_add(&box, &(region_box){p.x, p.y, p.x, p.y});
     }
+    if (is_clear(c, &box)) return keep_whole(c, triangle);
     if (!region_triangle_init(&l.shape, at[0], at[1], at[2])) return true; /* leaves have an area */
-    if (is_clear(c, &l.shape.box)) return keep_whole(c, triangle);
     if (!find_pieces(c, &l.shape)) return false;
     if (c->near.count == 0) return keep_whole(c, triangle);
     for (int i = 0; i < 3; i++) l.at[i] = (region_point){(int64_t)at[i].x << c->grid, (int64_t)at[i].y << c->grid};
@@ -408,20 +479,31 @@ rqt_status rqt_cut_make(const rqt_patch *patch, const rqt_region *region, const 
                  .grid = CUT_GRID_BITS(lattice->K),
                  .vertex = memory_take(allocator, patch->vertex_count * sizeof *c.vertex),
                  .clear = {1, 1, 0, 0},
-                 .faces = {.allocator = *allocator}};
-    rqt_status status = c.vertex ? RQT_OK : RQT_NO_MEMORY;
+                 .faces = {.allocator = *allocator},
+                 .is_interrupted = is_interrupted,
+                 .context = context};
+    /* Most leaves stay as they are: room for all of them at once. */
+    const bool room = c.vertex &&
+                      memory_grow(allocator, (void **)&cut->vertices, &cut->vertex_capacity, patch->vertex_count,
+                                  sizeof *cut->vertices) &&
+                      memory_grow(allocator, (void **)&cut->triangles, &cut->triangle_capacity,
+                                  patch->triangle_count, 3 * sizeof *cut->triangles);
+    rqt_status status = room ? RQT_OK : RQT_NO_MEMORY;
     for (size_t i = 0; c.vertex && i < patch->vertex_count; i++) c.vertex[i] = NO_VERTEX;
     for (size_t t = 0; t < patch->triangle_count && status == RQT_OK; t++) {
         const uint32_t *triangle = patch->triangles + 3 * t;
         if (is_interrupted && t % 4096 == 0 && is_interrupted(context))
             status = RQT_INTERRUPTED;
         else if (!(rqt_region_is_all(region) ? keep_whole(&c, triangle) : cut_triangle(&c, triangle)))
-            status = RQT_NO_MEMORY;
+            status = c.stopped ? RQT_INTERRUPTED : RQT_NO_MEMORY;
     }
     memory_drop(allocator, c.vertex);
     memory_drop(allocator, c.sides);
     memory_drop(allocator, c.numbers);
+    memory_drop(allocator, c.held);
+    memory_drop(allocator, c.part);
     memory_drop(allocator, c.near.items);
+    memory_drop(allocator, c.ways);
     memory_drop(allocator, c.places);
     cut_faces_free(&c.faces);
     if (status != RQT_OK) rqt_cut_free(cut);

@@ -40,6 +40,7 @@ typedef struct cut_faces {
     size_t point_count, point_capacity, face_of_capacity, face_count, face_capacity;
     uint32_t last, mark, turn; /* where the last search ended; stamps; which edge it looks at first */
     size_t patience;           /* how many more crossings are followed: see cut_faces_fix */
+    bool is_sound;             /* every segment is a union of edges */
     cut_rim *rim[2], *stack;
     size_t rim_count[2], rim_capacity[2], stack_capacity;
     uint32_t *hole, *pairs;

@@ -17,8 +17,14 @@
  */
 #include "cut.h"
 
-/* n * part / whole by long multiplication and division at once, a bit of n at a time: no step exceeds 2^127. */
+/* n * part / whole; large ones by long multiplication and division at once, a bit of n at a time: no step exceeds
+ * 2^127. */
 uint64_t cut_share(uint64_t n, __int128 part, __int128 whole) {
+    if (part >> (126 - 64 + __builtin_clzll(n | 1)) ==
+        0) { /* the product is no more than 2^126 either: nearly always */
+        const __int128 product = (__int128)n * part, share = product / whole;
+        return (uint64_t)share + (2 * (product - share * whole) >= whole);
+    }
     uint64_t quotient = 0;
     __int128 rest = 0;
     for (int bit = 63; bit >= 0; bit--) {
@@ -93,6 +99,7 @@ bool cut_faces_begin(cut_faces *f, const region_point corner[3]) {
     f->face_count = 1;
     f->last = 0;
     f->patience = 64;
+    f->is_sound = true;
     uint32_t p;
     for (int i = 0; i < 3; i++)
         if (!new_point(f, corner[i], &p)) return false;
@@ -486,7 +493,10 @@ static bool fix(cut_faces *f, uint32_t from, uint32_t to, int depth) {
             from = end.point;
             continue;
         }
-        if (f->patience == 0 || depth == 0) return true;
+        if (f->patience == 0 || depth == 0) {
+            f->is_sound = false;
+            return true;
+        }
         f->patience--;
         uint32_t at;
         if (!add_crossing(f, from, to, end.l, end.r, &at)) return false;

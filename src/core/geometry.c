@@ -213,6 +213,7 @@ rqt_status rqt_geometry_repeat(rqt_geometry *g, double period, double low, doubl
             }
         if (!(least >= -3 * period && most <= 3 * period)) continue;
         const double first = ceil((low - most) / period), last = floor((high - least) / period);
+        /* Whole numbers. NOLINTNEXTLINE(clang-analyzer-security.FloatLoopCounter) */
         for (double turn = first; turn <= last; turn++) {
             if (turn == 0) continue; /* the part where it is */
             const rqt_status status = add_moved(g, p, turn * period);

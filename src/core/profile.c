@@ -83,6 +83,7 @@ static bool make_pieces(profile *p, const rqt_lattice *lattice) {
             first = fmin(0, ceil((low - fmax(a, b)) / line->period));
             last = fmax(0, floor((high - fmin(a, b)) / line->period));
         }
+        /* Whole numbers. NOLINTNEXTLINE(clang-analyzer-security.FloatLoopCounter) */
         for (double turn = first; turn <= last; turn++)
             if (!add_piece(p, i, turn, &raster)) return false;
     }
@@ -218,6 +219,7 @@ static bool meet_triangle(profile *p, const uint32_t *corner, const line_piece *
         c[1] = c[2];
         c[2] = swap;
     }
+    /* Pieces come from points. NOLINTNEXTLINE(clang-analyzer-core.NullDereference) */
     const region_point a = piece->at.a, b = piece->at.b;
     const int of_a = place_in(c, a), of_b = place_in(c, b);
     const bool own = p->line->own[piece->point] != 0;

@@ -217,6 +217,13 @@ void rqt_region_free(rqt_region *region) {
     memory_drop(&a, region);
 }
 
+size_t rqt_region_bytes(const rqt_region *region) {
+    size_t nodes = region_tree_size(region->polygon_count) + region_tree_size(region->thin.count);
+    for (size_t i = 0; i < region->polygon_count; i++) nodes += region_tree_size(region->polygons[i].count);
+    return sizeof *region + (region->thin.capacity + region->border.capacity) * sizeof *region->border.items +
+           region->polygon_capacity * sizeof *region->polygons + nodes * sizeof *region->nodes;
+}
+
 /* ------------------------------------------------------------------------------------------- questions -- */
 bool rqt_region_is_all(const rqt_region *region) {
     return region->all;

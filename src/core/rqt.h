@@ -524,6 +524,7 @@ typedef struct rqt_placement {
 rqt_status rqt_region_create(const rqt_geometry *geometry, const rqt_placement *placement,
                              const rqt_lattice *lattice, const rqt_allocator *allocator, rqt_region **region);
 void rqt_region_free(rqt_region *region);
+size_t rqt_region_bytes(const rqt_region *region); /* of memory that it takes */
 bool rqt_region_is_all(const rqt_region *region);
 bool rqt_region_is_empty(const rqt_region *region);
 /* The region's box grown outward to whole samples and clamped to the raster. false when it misses the raster. */

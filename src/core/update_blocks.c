@@ -36,11 +36,13 @@ static size_t slot_of(const update *u, rqt_block_number number) {
 static bool grow_table(update *u) {
     update_item **old = u->table;
     const size_t slots = u->slots;
+    /* A table of pointers. NOLINTBEGIN(bugprone-sizeof-expression) */
     update_item **fresh = memory_take(u->allocator, (slots ? 2 * slots : 256) * sizeof *fresh);
     if (!fresh) return update_fail(u, RQT_NO_MEMORY);
     u->table = fresh;
     u->slots = slots ? 2 * slots : 256;
     memset(fresh, 0, u->slots * sizeof *fresh);
+    /* NOLINTEND(bugprone-sizeof-expression) */
     for (size_t i = 0; i < slots; i++)
         if (old[i]) u->table[slot_of(u, old[i]->number)] = old[i];
     memory_drop(u->allocator, old);

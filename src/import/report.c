@@ -14,6 +14,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #define MOST_TOLD 3 /* of a kind, in sentences */
@@ -208,12 +209,42 @@ static void put_all(FILE *file, const import_findings *f) {
     fputs("\n]}\n", file);
 }
 
+/* It is written beside its place, and then put there. NULL after a sentence. */
+static char *part_of(const import_job *job) {
+    const char *path = job->options->report;
+    char *part = malloc(strlen(path) + sizeof ".part");
+    if (!part) {
+        import_no_memory(job, "writing the report");
+        return NULL;
+    }
+    return strcat(strcpy(part, path), ".part");
+}
+
+static bool refuse_report(const import_job *job, const char *why) {
+    return import_refuse(job, "the report %s cannot be written: %s", job->options->report, why);
+}
+
+bool import_findings_probe(const import_job *job) {
+    struct stat there;
+    if (!stat(job->options->report, &there) && !S_ISREG(there.st_mode))
+        return refuse_report(job, S_ISDIR(there.st_mode) ? "it is a folder" : "it is a device, and not a file");
+    char *part = part_of(job);
+    if (!part) return false;
+    FILE *file = fopen(part, "w");
+    const int why = errno;
+    if (file) {
+        fclose(file);
+        unlink(part);
+    }
+    free(part);
+    return file || refuse_report(job, strerror(why));
+}
+
 bool import_findings_write(const import_job *job, const import_findings *f) {
     const char *path = job->options->report;
     if (!path) return true;
-    char *part = malloc(strlen(path) + sizeof ".part");
-    if (!part) return import_no_memory(job, "writing the report");
-    strcat(strcpy(part, path), ".part");
+    char *part = part_of(job);
+    if (!part) return false;
     FILE *file = fopen(part, "w");
     bool ok = file != NULL;
     if (ok) {
@@ -225,5 +256,5 @@ bool import_findings_write(const import_job *job, const import_findings *f) {
         errno = why;
     }
     free(part);
-    return ok || import_refuse(job, "the report %s cannot be written: %s", path, strerror(errno));
+    return ok || refuse_report(job, strerror(errno));
 }

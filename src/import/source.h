@@ -57,10 +57,17 @@ typedef struct import_paths {
 } import_paths;
 
 bool import_paths_find(const import_job *job, const char *const *arguments, int count, import_paths *paths);
-/* The sentence about a source that stands in a list, with its line before it. */
-void import_paths_place_sentence(const import_job *job, const import_paths *paths, const import_path *path);
+/* Describes path n. False when it is passed over (its `passed` says so, and a notice has told why), or is refused:
+ * then the sentence stands, with the line of the list before it. */
+bool import_paths_describe(const import_job *job, const import_paths *paths, int n, import_source *source);
+/* Where path n stands in a list, its line goes before the sentence that stands. */
+void import_paths_place_sentence(const import_job *job, const import_paths *paths, int n);
+/* A notice of the files that are no rasters. */
+void import_paths_tell_passed(const import_job *job, const import_paths *paths);
 void import_paths_free(import_paths *paths);
 bool import_is_folder(const char *path);
+/* Of two names that are not there yet, too: are they one place? */
+bool import_is_same_file(const char *a, const char *b);
 /* The last part of a path, without slashes at its end: for the terrain's name. free(). NULL: out of memory */
 char *import_base_of(const char *argument);
 
@@ -140,6 +147,8 @@ typedef struct import_findings {
 
 /* The worst of each kind, as sentences. Puts the conflicts into the order of the report. */
 void import_findings_tell(const import_job *job, const import_findings *findings);
+/* Can options->report be written? It is a new file, or takes a file's place. */
+bool import_findings_probe(const import_job *job);
 /* All of them into options->report. */
 bool import_findings_write(const import_job *job, const import_findings *findings);
 

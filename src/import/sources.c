@@ -18,7 +18,8 @@
 #include <sys/stat.h>
 
 #define MOST_LINE 65536
-#define MOST_DEPTH 64 /* of folders in folders */
+#define BYTE_ORDER_MARK "\xef\xbb\xbf" /* before a list from Windows */
+#define MOST_DEPTH 64                  /* of folders in folders */
 
 static bool ends_with(const char *text, const char *end) {
     const size_t n = strlen(text), m = strlen(end);
@@ -46,9 +47,22 @@ static int by_bytes(const void *a, const void *b) {
     return strcmp(((const import_path *)a)->path, ((const import_path *)b)->path);
 }
 
-static bool is_same_file(const char *a, const char *b) {
+/* The folder of a path and its last part; "a/b" and "./a//b" may be the same file before it is there. */
+static bool is_same_place(const char *a, const char *b) {
     struct stat x, y;
-    return !stat(a, &x) && !stat(b, &y) && x.st_dev == y.st_dev && x.st_ino == y.st_ino;
+    if (strcmp(CPLGetFilename(a), CPLGetFilename(b)) != 0) return false;
+    char *first = CPLStrdup(CPLGetDirname(a)), *second = CPLStrdup(CPLGetDirname(b));
+    const bool same = !stat(first, &x) && !stat(second, &y) && x.st_dev == y.st_dev && x.st_ino == y.st_ino;
+    CPLFree(first);
+    CPLFree(second);
+    return same;
+}
+
+bool import_is_same_file(const char *a, const char *b) {
+    struct stat x, y;
+    const bool first = !stat(a, &x), second = !stat(b, &y);
+    if (first && second) return x.st_dev == y.st_dev && x.st_ino == y.st_ino;
+    return !first && !second && is_same_place(a, b);
 }
 
 /* What stands beside rasters, or is of this import. */
@@ -56,7 +70,7 @@ static bool is_beside(const import_job *job, const char *path) {
     static const char *const ends[] = {".aux.xml", ".ovr", ".msk", ".hdr", ".prj", ".qpj", ".tfw", ".rqt-import"};
     for (size_t i = 0; i < sizeof ends / sizeof *ends; i++)
         if (ends_with(path, ends[i])) return true;
-    return is_same_file(path, job->database);
+    return import_is_same_file(path, job->database);
 }
 
 static bool is_raster(const char *path) {
@@ -137,6 +151,7 @@ static bool add_list(const import_job *job, import_paths *p, const char *list, i
     bool ok = true;
     char *text = NULL;
     for (int line = 1; ok && (text = (char *)(uintptr_t)CPLReadLine2L(file, MOST_LINE, NULL)) != NULL; line++) {
+        if (line == 1 && !strncmp(text, BYTE_ORDER_MARK, 3)) text += 3;
         ok = add_line(job, p, list, text, argument, line);
         if (!ok) place_sentence(job, list, line);
     }
@@ -155,8 +170,48 @@ bool import_paths_find(const import_job *job, const char *const *arguments, int 
     return ok;
 }
 
-void import_paths_place_sentence(const import_job *job, const import_paths *p, const import_path *path) {
-    place_sentence(job, p->argument[path->argument] + 1, path->line);
+/* A source that was only found in a folder, and is no terrain's: several bands, or none. */
+static bool is_passed_over(const import_job *job, const import_path *path) {
+    if (!path->found) return false;
+    CPLPushErrorHandler(CPLQuietErrorHandler);
+    GDALDatasetH d = GDALOpenEx(path->path, GDAL_OF_RASTER | GDAL_OF_READONLY, NULL, NULL, NULL);
+    int bands = d ? GDALGetRasterCount(d) : -1;
+    if (d) GDALClose(d);
+    /* A GeoPackage of tables, say, is identified and has no raster. */
+    if (!d && (d = GDALOpenEx(path->path, GDAL_OF_VECTOR | GDAL_OF_READONLY, NULL, NULL, NULL)) != NULL) {
+        bands = 0;
+        GDALClose(d);
+    }
+    CPLPopErrorHandler();
+    if (bands < 0 || bands == 1) return false;
+    if (bands)
+        import_notice(job, "%s is passed over: it has %d bands, and a terrain has one", path->path, bands);
+    else
+        import_notice(job, "%s is passed over: it holds no raster", path->path);
+    return true;
+}
+
+bool import_paths_describe(const import_job *job, const import_paths *p, int n, import_source *source) {
+    import_path *path = &p->path[n];
+    if (import_source_describe(job, path->path, source)) return true;
+    import_source_free(source);
+    path->passed = is_passed_over(job, path);
+    if (path->passed)
+        import_refuse(job, "%s", ""); /* it was none */
+    else
+        import_paths_place_sentence(job, p, n);
+    return false;
+}
+
+void import_paths_place_sentence(const import_job *job, const import_paths *p, int n) {
+    const import_path *path = &p->path[n];
+    if (path->line) place_sentence(job, p->argument[path->argument] + 1, path->line);
+}
+
+void import_paths_tell_passed(const import_job *job, const import_paths *p) {
+    if (!p->passed) return;
+    import_notice(job, "%lld file%s in folders %s no raster%s: passed over", (long long)p->passed,
+                  p->passed == 1 ? "" : "s", p->passed == 1 ? "is" : "are", p->passed == 1 ? "" : "s");
 }
 
 void import_paths_free(import_paths *p) {

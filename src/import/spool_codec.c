@@ -77,7 +77,7 @@ static bool make_room(uint8_t **bytes, size_t *room, size_t wanted) {
         uint##bits##_t all = 0, before = 0;                                                                       \
         for (size_t i = 0; i < width; i++) {                                                                      \
             const uint##bits##_t value = s->valid[i] ? v[i] : before, d = (uint##bits##_t)(value - before);       \
-            out[i] = (uint##bits##_t)(d << 1) ^ (uint##bits##_t) - (d >> (bits - 1));                             \
+            out[i] = (uint##bits##_t)(d << 1) ^ (uint##bits##_t) - (d >> ((bits)-1));                             \
             all |= out[i];                                                                                        \
             before = value;                                                                                       \
         }                                                                                                         \
@@ -87,7 +87,7 @@ static bool make_room(uint8_t **bytes, size_t *room, size_t wanted) {
             uint##bits##_t *to = out + y * width, any = 0;                                                        \
             for (size_t i = 0; i < width; i++) {                                                                  \
                 const uint##bits##_t d = valid[i] ? (uint##bits##_t)(row[i] - (over[i] ? up[i] : 0)) : 0;         \
-                to[i] = (uint##bits##_t)(d << 1) ^ (uint##bits##_t) - (d >> (bits - 1));                          \
+                to[i] = (uint##bits##_t)(d << 1) ^ (uint##bits##_t) - (d >> ((bits)-1));                          \
                 any |= to[i];                                                                                     \
             }                                                                                                     \
             all |= any;                                                                                           \

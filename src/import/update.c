@@ -1,8 +1,8 @@
 /* update.c - sources into a terrain that is there.
  *
- * What a source is, where it lies and what is void in it, is found out as for an import. Each is read by itself,
- * from north to south, and put in before the next one is opened: so a later one wins, and memory does not grow with
- * their number. Rows are read in strips that end where the terrain's blocks do.
+ * Which rasters are meant, what a source is, where it lies and what is void in it, is found out as for an import.
+ * Each is read by itself, from north to south, and put in before the next one is opened: so a later one wins, and
+ * memory does not grow with their number. Rows are read in strips that end where the terrain's blocks do.
  *
  * Heights become what the terrain holds. Whole numbers of the terrain's own unit are kept as they are; all others
  * are metres first, and rounded to the terrain's quantum. Where the terrain promises that nothing was rounded
@@ -25,6 +25,9 @@ typedef struct update_work {
     const store_terrain *terrain;
     import_source grid; /* the terrain as if it were a source */
     char grid_name[80];
+    import_paths paths;
+    char *names;     /* of the sources that were put in, a line each */
+    int64_t outside; /* rasters of folders that were not */
     store_update *store;
     import_database database;
     import_update_report *report;
@@ -80,9 +83,11 @@ static bool place(update_work *w, placed_source *p) {
     p->y0 = within(-p->row, 0, s->height);
     p->x1 = within(w->grid.width - p->column, 0, s->width);
     p->y1 = within(w->grid.height - p->row, 0, s->height);
-    if (p->x0 < p->x1 && p->y0 < p->y1) return true;
-    return import_refuse(&w->job, "%s lies outside %s: none of its %lld samples is one of the terrain's %d x %d",
-                         s->path, w->grid_name, (long long)s->width * s->height, w->grid.width, w->grid.height);
+    return true;
+}
+
+static bool is_outside(const placed_source *p) {
+    return p->x0 >= p->x1 || p->y0 >= p->y1;
 }
 
 /* ------------------------------------------------------------------------------------------------------- heights
@@ -239,27 +244,60 @@ static bool put_samples(update_work *w, placed_source *p) {
     return ok;
 }
 
-static bool put_source(update_work *w, const char *path, char **names) {
-    placed_source p = {0};
+static bool add_name(update_work *w, const char *base) {
+    char *longer = sqlite3_mprintf("%s%s%s", w->names ? w->names : "", w->names ? "\n" : "", base);
+    if (!longer) return import_no_memory(&w->job, "naming the sources");
+    sqlite3_free(w->names);
+    w->names = longer;
+    return true;
+}
+
+static bool put_described(update_work *w, placed_source *p) {
     const int64_t left_out = w->report->left_out;
-    bool ok = import_source_describe(&w->job, path, &p.source) &&
-              import_mosaic_plan(&w->job, &p.source, 1, &p.mosaic) && place(w, &p);
-    if (ok) {
-        p.is_raw = is_raw(&p, &w->terrain->unit);
-        ok = put_samples(w, &p);
-    }
-    if (ok && w->report->left_out > left_out)
-        import_notice(&w->job, "%s: %lld of its samples lie outside %s and are left out", path,
+    p->is_raw = is_raw(p, &w->terrain->unit);
+    if (!put_samples(w, p)) return false;
+    if (w->report->left_out > left_out)
+        import_notice(&w->job, "%s: %lld of its samples lie outside %s and are left out", p->source.path,
                       (long long)(w->report->left_out - left_out), w->grid_name);
-    if (ok) {
-        char *longer = sqlite3_mprintf("%s%s%s", *names ? *names : "", *names ? "\n" : "", p.source.base);
-        ok = longer || import_no_memory(&w->job, "naming the sources");
-        sqlite3_free(*names);
-        *names = longer;
-    }
+    return add_name(w, p->source.base);
+}
+
+/* Where does it lie? What is named must meet the terrain; what is only found in a folder may lie elsewhere: a
+ * delivery is often larger than the terrain. */
+static bool find_place(update_work *w, placed_source *p, import_path *path) {
+    if (!import_mosaic_plan(&w->job, &p->source, 1, &p->mosaic) || !place(w, p)) return false;
+    path->passed = path->found && is_outside(p);
+    w->outside += path->passed;
+    if (path->passed || !is_outside(p)) return true;
+    return import_refuse(&w->job, "%s lies outside %s: none of its %lld samples is one of the terrain's %d x %d",
+                         path->path, w->grid_name, (long long)p->source.width * p->source.height, w->grid.width,
+                         w->grid.height);
+}
+
+static bool put_source(update_work *w, int n) {
+    placed_source p = {0};
+    import_path *path = &w->paths.path[n];
+    if (!import_paths_describe(&w->job, &w->paths, n, &p.source)) return path->passed;
+    bool ok = find_place(w, &p, path);
+    if (!ok) import_paths_place_sentence(&w->job, &w->paths, n);
+    if (ok && !path->passed) ok = put_described(w, &p);
     import_mosaic_free(&p.mosaic);
     import_source_free(&p.source);
     return ok;
+}
+
+static bool put_all(update_work *w) {
+    for (int n = 0; n < w->paths.count; n++)
+        if (!put_source(w, n)) return false;
+    import_paths_tell_passed(&w->job, &w->paths);
+    if (w->names) {
+        if (w->outside)
+            import_notice(&w->job, "%lld raster%s in folders lie%s outside %s: passed over", (long long)w->outside,
+                          w->outside == 1 ? "" : "s", w->outside == 1 ? "s" : "", w->grid_name);
+        return true;
+    }
+    return import_refuse(&w->job, "%s holds no raster of one band%s%s", w->paths.argument[0],
+                         w->outside ? " that meets " : "", w->outside ? w->grid_name : "");
 }
 
 /* ----------------------------------------------------------------------------------------------------- the whole
@@ -271,10 +309,10 @@ static bool minimal_progress(void *context, double done) {
                            (int64_t)w->terrain->lattice.width * w->terrain->lattice.height);
 }
 
-static bool finish(update_work *w, const char *names) {
+static bool finish(update_work *w) {
     char *detail = NULL;
     const double start = now();
-    const int code = store_update_finish(w->store, names, minimal_progress, w, &detail);
+    const int code = store_update_finish(w->store, w->names, minimal_progress, w, &detail);
     if (code != SQLITE_OK) return fail_store(w, code, detail);
     const store_update_report *told = store_update_told(w->store);
     import_update_report *r = w->report;
@@ -314,7 +352,6 @@ static bool begin(update_work *w) {
 int import_update(const char *const *sources, int count, const char *database, const import_options *options,
                   bool voids, import_update_report *report, char *message, size_t message_size) {
     update_work w = {.job = {options, database, message, message_size}, .voids = voids, .report = report};
-    char *names = NULL;
     *report = (import_update_report){0};
     if (message && message_size) message[0] = 0;
     GDALAllRegister();
@@ -323,13 +360,12 @@ int import_update(const char *const *sources, int count, const char *database, c
     bool ok = count > 0 || import_refuse(&w.job, "no source to update from");
     if (ok && options->unit && !import_unit_parse(options->unit, &unit))
         ok = import_refuse(&w.job, "the unit '%s' is not m, ft, us-ft or a number of metres", options->unit);
-    ok = ok && begin(&w);
-    for (int i = 0; i < count && ok; i++) ok = put_source(&w, sources[i], &names);
-    ok = ok && finish(&w, names);
+    ok = ok && import_paths_find(&w.job, sources, count, &w.paths) && begin(&w) && put_all(&w) && finish(&w);
     store_update_free(w.store);
     import_database_close(&w.job, &w.database);
     if (w.grid.crs) OSRDestroySpatialReference(w.grid.crs);
-    sqlite3_free(names);
+    sqlite3_free(w.names);
+    import_paths_free(&w.paths);
     CPLPopErrorHandler();
     return ok ? 0 : 1;
 }

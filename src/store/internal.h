@@ -30,6 +30,7 @@ struct store {
     int count;
     bool known;                         /* terrains are read, and the cache holds only what is theirs */
     uint64_t version;                   /* of all databases, when they were read */
+    uint64_t state;                     /* how often that was; store_state */
     sqlite3_stmt *held[MOST_DATABASES]; /* statements that hold a database as it is */
     sqlite3_stmt *probe;                /* asks whether we are interrupted */
     int holders;                        /* calls of store_begin that have not ended */

@@ -86,6 +86,7 @@ static void forget(store *s) {
     s->terrains = NULL;
     s->count = 0;
     s->known = false;
+    s->state++;
     store_methods_free(s);
     block_cache_clear(s->cache);
     if (s->has_summaries) memset(s->summaries, 0, SUMMARY_PLACES * sizeof *s->summaries);
@@ -257,6 +258,10 @@ int store_find(store *s, const char *name, const store_terrain **terrain, char *
     code = find(s, name, terrain, error);
     store_end(s);
     return code;
+}
+
+uint64_t store_state(const store *s) {
+    return s->known ? s->state : 0;
 }
 
 int store_terrains(store *s, store_terrain **terrains, int *count, char **error) {

@@ -66,6 +66,9 @@ void store_end(store *s);
  * with a sentence that lists what there is when it is unknown, ambiguous or incomplete. Valid until the next call
  * of store_find on this store. */
 int store_find(store *s, const char *name, const store_terrain **terrain, char **error);
+/* After store_find, between store_begin and store_end: a number that stays while everything in every database of
+ * the connection but temp does, and comes no second time; 0: this connection writes, and nothing may be kept. */
+uint64_t store_state(const store *s);
 /* Does the name mean this terrain? 2: by its own name; 1: as "schema.name"; 0: no. */
 int store_name_means(const store_terrain *terrain, const char *name);
 /* All terrains, incomplete ones too, by schema and name. *count entries; release with store_terrains_free. */

@@ -144,6 +144,7 @@ static int fill_kept(store_update *u, int32_t col, int32_t row, int32_t width, i
                 at_hand = number;
             }
             const size_t from = (size_t)(row + y - (j << shift)) * (size_t)n + (size_t)(col + x - (i << shift));
+            /* No number is 0, so it was read. NOLINTNEXTLINE(clang-analyzer-core.NullDereference) */
             u->q[to] = block->q[from];
             u->valid[to] = block->flags[from] & RQT_VALID;
         }

@@ -23,6 +23,10 @@ static void numbers_of_a_lattice(input *in) {
         for (int c = 0; c < n; c++) found |= back[c].x == v.x && back[c].y == v.y;
         HOLD(found, "(%d,%d) is no child of its parent", v.x, v.y);
     }
+    const int rank = rqt_vertex_rank(&l, v);
+    HOLD(rank / 2 == scale && rank < RQT_RANKS, "rank %d, scale %d", rank, scale);
+    for (int p = 0; p < parents; p++)
+        HOLD(rqt_vertex_rank(&l, parent[p]) > rank, "(%d,%d) ranks no lower than its parent", v.x, v.y);
     const int children = rqt_vertex_children(&l, v, child);
     for (int c = 0; c < children; c++) {
         bool found = false;

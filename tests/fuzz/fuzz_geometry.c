@@ -121,6 +121,100 @@ static void look(input *in, const rqt_region *region, const rqt_lattice *l) {
     }
 }
 
+/* ------------------------------------------------------------------------------------ grown and snapped */
+static void snap(input *in, rqt_region *region, const rqt_lattice *l, const rqt_allocator *a, fuzz_heap *h) {
+    rqt_region *snapped = NULL;
+    const int32_t side = rqt_region_snap_side(region);
+    HOLD(side >= 1 && (side & (side - 1)) == 0, "a side of %d", side);
+    if (!went_well(rqt_region_snap(region, l, a, &snapped), h)) return;
+    HOLD(rqt_region_is_all(snapped) == rqt_region_is_all(region), "everything stays everything");
+    for (int grown = 0; grown < 2; grown++) {
+        for (int n = 0; n < 12 && l->width > 1 && l->height > 1; n++) {
+            const int32_t x = take_between(in, 0, l->width - 2), y = take_between(in, 0, l->height - 2);
+            const rqt_vertex nw = {x, y}, ne = {x + 1, y}, sw = {x, y + 1}, se = {x + 1, y + 1};
+            const bool meets = rqt_region_meets(region, nw, sw, se) || rqt_region_meets(region, nw, ne, se);
+            const bool one = rqt_region_meets(snapped, nw, sw, se), other = rqt_region_meets(snapped, nw, ne, se);
+            HOLD(!meets || (one && other), "cell (%d,%d) is lost", x, y);
+            HOLD(one == other, "half of cell (%d,%d)", x, y);
+        }
+        if (grown || !went_well(RQT_OK, h)) break;
+        rqt_region_grow_rectangle(region);
+        rqt_region_free(snapped);
+        if (!went_well(rqt_region_snap(region, l, a, &snapped), h)) return;
+        look(in, region, l);
+    }
+    rqt_region_free(snapped);
+}
+
+/* ------------------------------------------------------------------------------------ members, lines, bytes */
+/* As bytes and back: the same members, and as many points. */
+static void there_and_back(const rqt_geometry *geometry, const rqt_allocator *a, fuzz_heap *h) {
+    uint8_t *wkb = NULL;
+    size_t n = 0;
+    if (!went_well(rqt_geometry_wkb(geometry, a, &wkb, &n), h)) return;
+    uint8_t *exact = exact_copy(wkb, n);
+    (void)a->resize(a->context, wkb, 0);
+    rqt_geometry *back = NULL;
+    rqt_message why = {""};
+    const rqt_status status = rqt_geometry_parse(exact, n, false, a, &back, &why);
+    free(exact);
+    HOLD(status == RQT_OK || status == RQT_NO_MEMORY, "%s", why.text);
+    if (!went_well(status, h)) return;
+    HOLD(rqt_geometry_members(back) == rqt_geometry_members(geometry) &&
+             rqt_geometry_is_empty(back) == rqt_geometry_is_empty(geometry),
+         "%zu members, %zu", rqt_geometry_members(geometry), rqt_geometry_members(back));
+    for (size_t i = 0; i < rqt_geometry_members(back); i++) {
+        size_t points, others;
+        const double *one = rqt_geometry_line(geometry, i, &points), *other = rqt_geometry_line(back, i, &others);
+        HOLD(points == others && (one == NULL) == (other == NULL), "member %zu", i);
+        HOLD(points == 0 || memcmp(one, other, 2 * points * sizeof *one) == 0, "points of member %zu", i);
+    }
+    rqt_geometry_free(back);
+}
+
+static void repeat(input *in, rqt_geometry *geometry, const rqt_allocator *a, fuzz_heap *h) {
+    const size_t before = rqt_geometry_members(geometry);
+    const double period = take_between(in, 1, 720), low = take_between(in, -720, 720),
+                 high = low + take_between(in, 0, 720);
+    HOLD(rqt_geometry_is_empty(geometry) == (before == 0), "%zu members", before);
+    there_and_back(geometry, a, h);
+    if (!went_well(rqt_geometry_repeat(geometry, period, low, high), h)) return;
+    const size_t after = rqt_geometry_members(geometry);
+    HOLD(after >= before && (before > 0 || after == 0), "%zu members, then %zu", before, after);
+    for (size_t i = before; i < after; i++) {
+        size_t points;
+        const double *line = rqt_geometry_line(geometry, i, &points);
+        double least = INFINITY, most = -INFINITY;
+        for (size_t p = 0; p < points; p++) least = fmin(least, line[2 * p]), most = fmax(most, line[2 * p]);
+        HOLD(!line || (least <= high + 1e-6 && most >= low - 1e-6), "a copy from %g to %g", least, most);
+    }
+    there_and_back(geometry, a, h);
+}
+
+static void lines(input *in, const rqt_allocator *a, fuzz_heap *h) {
+    double xy[24];
+    size_t counts[5];
+    size_t used = 0, wanted = 0;
+    bool finite = true;
+    const size_t n = (size_t)take_between(in, 0, 5);
+    for (size_t i = 0; i < n; i++) {
+        counts[i] = (size_t)take_between(in, 0, 4);
+        wanted += counts[i] > 0;
+        for (size_t p = 0; p < 2 * counts[i]; p++, used++) {
+            xy[used % 24] = take_between(in, 0, 7) ? take_between(in, -99, 99) / 8.0 : take_double(in);
+            finite &= isfinite(xy[used % 24]);
+        }
+        if (used > 24) return;
+    }
+    rqt_geometry *geometry = NULL;
+    const rqt_status status = rqt_geometry_of_lines(xy, counts, n, 4326, a, &geometry);
+    HOLD(finite || status == RQT_INVALID || status == RQT_NO_MEMORY, "status %d", (int)status);
+    if (!finite || !went_well(status, h)) return;
+    HOLD(rqt_geometry_members(geometry) == wanted && rqt_geometry_srid(geometry) == 4326, "%zu lines", wanted);
+    there_and_back(geometry, a, h);
+    rqt_geometry_free(geometry);
+}
+
 const long fuzz_runs = 8000;
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
@@ -158,10 +252,15 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
                       &heap)) {
             in = rest;
             look(&in, region, &l);
+            snap(&in, region, &l, &a, &heap);
         }
+        in = rest;
+        repeat(&in, geometry, &a, &heap);
     }
     rqt_region_free(region);
     rqt_geometry_free(geometry);
+    in = rest;
+    lines(&in, &a, &heap);
     HOLD(heap.live == 0, "%zu bytes leaked", heap.live);
     return 0;
 }

@@ -4,6 +4,10 @@
 
 /* What the argument of this name wants, mostly; sometimes anything. */
 static void take_argument(input *in, const char *name, size_t n, char *text, size_t room) {
+    if (n == strlen("options") && strncmp(name, "options", n) == 0 && take_between(in, 0, 3)) {
+        take_options(in, text, room);
+        return;
+    }
     static const struct {
         const char *name, *values[8];
     } fitting[] = {
@@ -21,7 +25,8 @@ static void take_argument(input *in, const char *name, size_t n, char *text, siz
         {"options",
          {"NULL", "'{}'", "'{\"metric\":\"minimal\"}'", "'{\"select\":\"bottomup\"}'", "'{\"outline\":\"tol\"}'",
           "'{\"max_vertices\":60}'", "'{\"mode\":\"border\"}'", "'{\"mode\":\"cut\",\"strip\":\"fan\"}'"}},
-        {"format", {"'strip'", "'indexed'", "'rqt'", "'obj'", "'ply'", "'wkb'", "'gpkg'", "'spatialite'"}},
+        {"format",
+         {"'strip'", "'rqt+normals'", "'rqt'", "'obj'", "'ply+normals'", "'wkb'", "'gpkg'", "'spatialite'"}},
         {"blob",
          {"(SELECT data FROM rqt_block_1 LIMIT 1)", "(SELECT data FROM rqt_block_2 ORDER BY id DESC LIMIT 1)",
           "zeroblob(41)", "(SELECT data FROM rqt_block_1 LIMIT 1 OFFSET 9)",
@@ -52,7 +57,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         db = fuzz_database();
     }
     const function *f = &rqt_functions[take_between(&in, 0, rqt_function_count - 1)];
-    char sql[6000], value[800];
+    char sql[8000], value[2000];
     size_t n = (size_t)snprintf(sql, sizeof sql, "SELECT %s%s(", f->fill ? "* FROM " : "", f->name);
     /* Arguments by their names in "region, eps [, terrain [, options]]", all or the first few, or one too many. */
     int most = take_between(&in, 0, 3) ? 100 : take_between(&in, 0, 6), count = 0;

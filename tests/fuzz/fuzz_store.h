@@ -80,6 +80,19 @@ static inline sqlite3 *fuzz_database(void) {
     HOLD(store_make_geopackage(db, &error) == SQLITE_OK, "%s", error);
     fuzz_write_terrain(db, "hills", 1, true);
     fuzz_write_terrain(db, "plain", 5, false);
+    fuzz_run(db, "CREATE TABLE places(geom, eps);"
+                 "INSERT INTO places VALUES ('POINT(-71.3 44.3)', 1), ('LINESTRING(2 -2, 9 -9)', 0.5);"
+                 "CREATE TABLE odd(shape BLOB, eps);"
+                 "INSERT INTO odd VALUES ('POLYGON((1 -1,9 -1,9 -9,1 -1))', 2), (x'47500001', 1);"
+                 "CREATE TABLE wrong(geometry TEXT, eps);"
+                 "INSERT INTO wrong VALUES ('POINT(3 -3)', 9e999), ('POINT(3 -3)', 'deep'), (NULL, 1);"
+                 "CREATE TABLE bare(x);"
+                 "CREATE VIEW several AS SELECT geom, geom AS shape, eps FROM places;"
+                 "CREATE VIEW broken AS SELECT geom, nosuch(eps) AS eps FROM places;"
+                 "CREATE VIEW round AS SELECT 'POINT(3 -3)' AS geom, error AS eps FROM "
+                 "rqt_range('POINT(3 -3)', 3, 'plain', '{\"detail\":\"round\"}');"
+                 "CREATE VIEW many AS WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n LIMIT 300) "
+                 "SELECT 'POINT(' || i % 20 || ' ' || -i / 15 || ')' AS geom, i / 9.0 AS eps FROM n");
     fuzz_run(db, "COMMIT");
     return db;
 }
@@ -106,6 +119,58 @@ static inline int fuzz_patience(void *context) {
 }
 
 /* ---------------------------------------------------------------------------------------- hostile values */
+/* Options that mostly fit: a few keys, each with a value of its own kind; of detail, lists and tables. */
+static inline void take_options(input *in, char *text, size_t room) {
+    static const struct {
+        const char *key, *values[8];
+    } options[] = {
+        {"mode", {"\"cover\"", "\"snap\"", "\"border\"", "\"cut\"", "\"cut\"", "\"border\"", "\"snap\"", "[]"}},
+        {"detail",
+         {"\"places\"", "\"odd\"", "\"wrong\"", "\"bare\"", "\"several\"", "\"broken\"", "\"round\"", "\"many\""}},
+        {"detail",
+         {"\"main.places\"", "\"temp.places\"", "\"rqt_terrain\"", "\"sqlite_schema\"", "\"\"", "\"places\\\" x\"",
+          "\"rqt_help\"", "{\"places\":1}"}},
+        {"outline", {"\"exact\"", "\"tol\"", "\"tol\"", "\"tol\"", "\"exact\"", "\"\"", "null", "3"}},
+        {"frame", {"\"ecef\"", "\"enu\"", "\"crs\"", "\"ecef\"", "\"enu\"", "\"ECEF\"", "true", "\"enu \""}},
+        {"select",
+         {"\"topdown\"", "\"bottomup\"", "\"threshold\"", "\"topdown\"", "\"bottomup\"", "1", "\"\"", "\"top\""}},
+        {"metric",
+         {"\"minimal\"", "\"wedgie\"", "\"exact\"", "\"local\"", "\"euclid\"", "\"wedgie\"", "\"exact\"", "0"}},
+        {"max_vertices", {"4", "40", "400", "1e15", "3.5", "-9e99", "9007199254740993", "\"40\""}},
+    };
+    static const char *const geometries[] = {
+        "\"POINT(-71.3 44.3)\"",
+        "\"POINT(3 -3)\"",
+        "\"POLYGON((1 -1,9 -1,9 -9,1 -1))\"",
+        "\"POLYGON((-71.4 44.2, -71.2 44.2, -71.3 44.4, -71.4 44.2))\"",
+        "\"LINESTRING(0 0, 1e300 -1e300)\"",
+        "\"POLYGON EMPTY\"",
+        "\"SRID=31287;POINT(1 1)\"",
+        "\"POINT(nan 1)\"",
+        "\"GEOMETRYCOLLECTION(POINT(2 -2),LINESTRING(0 0,20 -20),POLYGON((0 0,9 0,9 -9,0 0)))\"",
+        "7",
+        "\"\\u0000\""};
+    static const char *const tolerances[] = {"0",     "0.5", "3",     "40",     "1e308",
+                                             "9e999", "-1",  "\"3\"", "1e-320", "3,4"};
+    size_t n = (size_t)snprintf(text, room, "'{");
+    for (int i = take_between(in, 1, 3); i > 0; i--) {
+        const int which = take_between(in, 0, (int)(sizeof options / sizeof *options));
+        if (which < (int)(sizeof options / sizeof *options)) {
+            n += (size_t)snprintf(text + n, room - n, "\"%s\":%s", options[which].key,
+                                  options[which].values[take_between(in, 0, 7)]);
+        } else {
+            n += (size_t)snprintf(text + n, room - n, "\"detail\":[");
+            for (int places = take_between(in, 0, 3); places > 0; places--)
+                n += (size_t)snprintf(text + n, room - n, "[%s,%s]%s",
+                                      geometries[take_bits(in, 1) % (sizeof geometries / sizeof *geometries)],
+                                      tolerances[take_bits(in, 1) % (sizeof tolerances / sizeof *tolerances)],
+                                      places > 1 ? "," : "");
+            n += (size_t)snprintf(text + n, room - n, "]");
+        }
+        n += (size_t)snprintf(text + n, room - n, i > 1 ? "," : "}'");
+    }
+}
+
 /* An SQL expression, in a buffer of at least 400 characters. */
 static inline void take_value(input *in, char *text, size_t room) {
     static const char *const regions[] = {"NULL",

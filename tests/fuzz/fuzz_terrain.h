@@ -79,14 +79,14 @@ static inline rqt_query pyramid_query(const fuzz_terrain *t, pyramid *p, const r
     return query;
 }
 
-/* Everything, a box or a triangle somewhere. NULL: no memory. */
+/* Everything, a box, a line, a triangle, or rings and members over one another, somewhere. NULL: no memory. */
 static inline rqt_region *take_region(input *in, const rqt_lattice *l, const rqt_allocator *a) {
     char text[400];
     rqt_geometry *g = NULL;
     rqt_region *region = NULL;
     rqt_message why;
     rqt_status status = RQT_OK;
-    const int kind = take_between(in, 0, 3);
+    const int kind = take_between(in, 0, 5);
     const double x = take_between(in, -16, 200) / 8.0, y = take_between(in, -16, 200) / 8.0;
     const double u = take_between(in, -16, 200) / 8.0, v = take_between(in, -16, 200) / 8.0;
     if (kind == 1)
@@ -95,6 +95,16 @@ static inline rqt_region *take_region(input *in, const rqt_lattice *l, const rqt
     if (kind == 2) (void)snprintf(text, sizeof text, "LINESTRING(%g %g, %g %g, %g %g)", x, y, u, v, v, y);
     if (kind == 3)
         (void)snprintf(text, sizeof text, "POLYGON((%g %g, %g %g, %g %g, %g %g))", x, y, u, y, v, u, x, y);
+    /* thirds and sevenths: places that no double has */
+    if (kind == 4)
+        (void)snprintf(text, sizeof text,
+                       "POLYGON((%.17g %.17g, %g %.17g, %.17g %g, %.17g %.17g), (%g %g, %g %g, %g %g, %g %g))",
+                       x / 3, y / 7, u, v / 3, v / 7, y, x / 3, y / 7, y, x, v, y, u, v, y, x);
+    if (kind == 5)
+        (void)snprintf(text, sizeof text,
+                       "GEOMETRYCOLLECTION(POLYGON((%g %g, %g %g, %.17g %g, %g %g)), LINESTRING(%g %.17g, %g %g), "
+                       "POINT(%g %g))",
+                       x, y, u, y, v / 3, u, x, y, y, u / 7, v, x, x, v);
     if (kind) status = rqt_geometry_parse(text, strlen(text), true, a, &g, &why);
     const rqt_placement origin = {0, 0, 1, 1};
     if (status == RQT_OK) status = rqt_region_create(g, &origin, l, a, &region);

@@ -1,6 +1,6 @@
-/* fuzz_wire.c - meshes as bytes, 'rqt' and increments, 'strip' and 'indexed': those of queries come back as they
- * were; damaged ones, signed again, inside and outside the compressed frame, and any bytes, are refused or are
- * meshes. */
+/* fuzz_wire.c - meshes as bytes, 'rqt' with normals or without, and increments, 'strip' and 'indexed': those of
+ * queries come back as they were; damaged ones, signed again, inside and outside the compressed frame, and any
+ * bytes, are refused or are meshes. */
 #include "fuzz_terrain.h"
 
 #include <zstd.h>
@@ -14,6 +14,35 @@ typedef struct wire {
 
 static void check_mesh(const rqt_patch *p) {
     for (size_t i = 0; i < 3 * p->triangle_count; i++) HOLD(p->triangles[i] < p->vertex_count, "index %zu", i);
+}
+
+/* What there is: unit vectors that do not point down. */
+static void read_normals(const uint8_t *bytes, size_t size, const rqt_wire_header *header, size_t vertices,
+                         const rqt_allocator *a) {
+    float *normals = malloc(3 * vertices * sizeof *normals + 1);
+    if (!normals) abort();
+    rqt_message why = {""};
+    const rqt_status status = rqt_wire_normals(bytes, size, vertices, a, normals, &why);
+    HOLD(status == RQT_OK || why.text[0], "status %d without a sentence", (int)status);
+    HOLD(status == RQT_OK || status == RQT_CORRUPT || status == RQT_NO_MEMORY ||
+             (status == RQT_INVALID && !header->has_normals),
+         "status %d", (int)status);
+    HOLD(status != RQT_OK || header->has_normals, "normals out of nothing");
+    for (size_t i = 0; status == RQT_OK && i < vertices; i++) {
+        const float *n = normals + 3 * i;
+        HOLD(fabs(sqrt((double)n[0] * n[0] + (double)n[1] * n[1] + (double)n[2] * n[2]) - 1) < 1e-6 &&
+                 n[2] > -1e-6f,
+             "(%g,%g,%g)", n[0], n[1], n[2]);
+    }
+    HOLD(rqt_wire_normals(bytes, size, vertices + 1, a, normals, &why) != RQT_OK, "normals of another number");
+    free(normals);
+}
+
+static void one_normal(input *in, float normal[3]) {
+    double v[3] = {take_between(in, -99, 99), take_between(in, -99, 99), take_between(in, 0, 99)};
+    const double length = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+    if (length == 0) v[2] = 1;
+    for (int c = 0; c < 3; c++) normal[c] = (float)(v[c] / (length > 0 ? length : 1));
 }
 
 static void decode(input *in, const uint8_t *bytes, size_t size, const wire *state, const rqt_allocator *a,
@@ -32,6 +61,7 @@ static void decode(input *in, const uint8_t *bytes, size_t size, const wire *sta
     HOLD(status != RQT_OK || info == RQT_OK, "decode knows better than info");
     HOLD(status != RQT_NO_MEMORY || h->refuse || info == RQT_OK, "no memory for nothing");
     if (status == RQT_OK) check_mesh(&patch);
+    if (status == RQT_OK) read_normals(exact, size, &again, patch.vertex_count, a);
     rqt_patch_free(&patch);
     if (state) {
         why.text[0] = 0;
@@ -104,6 +134,45 @@ static void damage(input *in, wire *w) {
     fuzz_sign(w->bytes, w->size, AT_CHECKSUM);
 }
 
+/* Normals beside a mesh, which stays as it is; damaged, they are refused or are normals. */
+static void add_normals(input *in, const wire *w, const rqt_allocator *a, fuzz_heap *h) {
+    const size_t n = w->patch.vertex_count, bound = w->size + rqt_wire_normals_bound(n);
+    float *normals = malloc(3 * n * sizeof *normals + 1), *back = malloc(3 * n * sizeof *back + 1);
+    wire with = {.bytes = malloc(bound), .size = w->size};
+    if (!normals || !back || !with.bytes) abort();
+    memcpy(with.bytes, w->bytes, w->size);
+    for (size_t i = 0; i < n; i++) one_normal(in, normals + 3 * i);
+    HOLD(rqt_wire_add_normals(normals, n + 1, a, with.bytes, &with.size) == RQT_INVALID, "one too many");
+    if (went_well(rqt_wire_add_normals(normals, n, a, with.bytes, &with.size), h)) {
+        rqt_message why;
+        HOLD(with.size <= bound, "%zu bytes, bound %zu", with.size, bound);
+        HOLD(rqt_wire_add_normals(normals, n, a, with.bytes, &with.size) == RQT_INVALID, "twice");
+        if (went_well(rqt_wire_normals(with.bytes, with.size, n, a, back, &why), h))
+            for (size_t i = 0; i < n; i++) {
+                double cosine = 0;
+                for (size_t c = 0; c < 3; c++) cosine += (double)normals[3 * i + c] * back[3 * i + c];
+                HOLD(cosine > 0.99995, "normal %zu comes back %g degrees off", i, acos(cosine) * 57.3);
+                int8_t packed[2], again[2];
+                float one[3];
+                rqt_normal_pack(normals + 3 * i, packed);
+                rqt_normal_unpack(packed, one);
+                rqt_normal_pack(one, again);
+                HOLD(memcmp(one, back + 3 * i, sizeof one) == 0 && memcmp(packed, again, sizeof packed) == 0,
+                     "normal %zu is packed otherwise alone", i);
+            }
+        decode(in, with.bytes, with.size, NULL, a, h);
+        /* the mesh's frame is left alone: what is hit is the header and the normals */
+        take_damage(in, with.bytes + w->size, with.size - w->size);
+        if (take_between(in, 0, 3) == 0) take_damage(in, with.bytes, RQT_WIRE_HEADER_BYTES);
+        if (take_between(in, 0, 3) == 0) with.size -= (size_t)take_bits(in, 3) % (with.size - w->size + 1);
+        fuzz_sign(with.bytes, with.size, 8);
+        decode(in, with.bytes, with.size, NULL, a, h);
+    }
+    free(normals);
+    free(back);
+    free(with.bytes);
+}
+
 static void own_formats(input *in, const wire *w) {
     const rqt_mesh_header header = {.kind = RQT_MESH_INDEXED,
                                     .vertex_count = w->patch.vertex_count,
@@ -170,6 +239,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
                          "an increment ends somewhere else");
                 rqt_patch_free(&patch);
                 own_formats(&in, &fine);
+                add_normals(&in, &coarse, &a, &heap);
                 damage(&in, &coarse);
                 decode(&in, coarse.bytes, coarse.size, NULL, &a, &heap);
                 damage(&in, &fine);

@@ -34,4 +34,13 @@ MUTANTS = [
     ("faults: a void vertex with a height", "src/core/summary.c",
      "(v->flags & RQT_VALID || v->q == 0)", "true",
      "fuzz/fuzz_block", "a summary has two spellings"),
+    ("faults: F53, statements that outlive their release", "src/store/store.c",
+     "void store_release(store *s) {\n    finalize_all(s);", "void store_release(store *s) {",
+     "test_store_faults", "F53_vacuum_and_close_succeed_after_queries"),
+    ("faults: F54, an interrupt taken for damage", "src/store/query.c",
+     "code = status == RQT_READ_FAILED || status == RQT_INTERRUPTED ? r.code", "code = status == RQT_READ_FAILED ? r.code",
+     "test_store_faults", "F54_an_interrupt_stops_a_query_and_leaves_nothing_behind"),
+    ("faults: F55, a summary of another block is believed", "src/store/query.c",
+     "!rqt_summary_answers(&answer->summary, outline, eps) ||", "",
+     "test_store_faults", "F55_a_damaged_terrain_gives_an_error_or_the_right_answer"),
 ]

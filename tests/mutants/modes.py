@@ -84,4 +84,17 @@ MUTANTS = [
     ("detail: a NULL geometry is everything", "ext/detail.c",
      "if (type != SQLITE_TEXT && type != SQLITE_BLOB)\n", "if (type != SQLITE_TEXT && type != SQLITE_BLOB && type != SQLITE_NULL)\n",
      "test_sql_detail.py", "in a table: a NULL geometry is not everything"),
+    # what is kept of a table
+    ("detail: places are kept whatever changes", "ext/detail.c", "p->state == store_state(r->store) && ", "",
+     "test_sql_detail.py", "kept places"),
+    ("detail: while the connection writes, places are kept", "src/store/store.c", "return s->known ? s->state : 0;",
+     "return s->state;", "test_sql_detail.py", "kept places"),
+    ("detail: a table of temp is kept", "ext/detail.c", 'if (sqlite3_stricmp(s->schema, "temp") == 0) return SQLITE_OK;', "",
+     "test_sql_detail.py", "kept places: temp changes unseen"),
+    ("detail: a view is kept", "ext/detail.c", "type = 'table' AND rootpage > 0 ", "1 ",
+     "test_sql_detail.py", "kept places"),
+    ("detail: places go by their table's name alone", "ext/detail.c", "strcmp(p->schema, s->schema) == 0 &&", "true &&",
+     "test_sql_detail.py", "kept places"),
+    ("detail: nothing is kept", "ext/detail.c", "places_release(*kept);\n    *kept = p;\n    p->holders++;", "(void)kept;",
+     "test_sql_detail.py", "kept places: a table that has not changed is read once"),
 ]
