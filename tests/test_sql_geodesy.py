@@ -614,9 +614,12 @@ def frames():
     import_terrain(path, write_grid(temp("past.asc"), [[5] * 14 for _ in range(14)], y0=-90, cell=180 / 13, crs=WGS84), name="past",
                    block=2)
     check("F28 a row beyond the pole by a rounding, to begin with", one(db, "SELECT y0 FROM rqt_terrains WHERE name = 'past'") > 90)
-    equal("F28 a row beyond the pole by a rounding is the pole",
-          one(db, "SELECT count(*), min(abs(z)) > 6356000 FROM rqt_range(NULL, 1e6, 'past', '{\"frame\":\"ecef\"}') "
-                  "WHERE abs(x) < 1e-3 AND abs(y) < 1e-3"), (2, 1))
+    try:
+        seen = one(db, "SELECT count(*), min(abs(z)) > 6356000 FROM rqt_range(NULL, 1e6, 'past', '{\"frame\":\"ecef\"}') "
+                       "WHERE abs(x) < 1e-3 AND abs(y) < 1e-3")
+    except Exception as error:
+        seen = str(error)
+    equal("F28 a row beyond the pole by a rounding is the pole", seen, (2, 1))
     db.close()
 
 
