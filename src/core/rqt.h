@@ -84,8 +84,8 @@ int rqt_vertex_scale(const rqt_lattice *lattice, rqt_vertex v);
 /* The level of a vertex: 0 for the corners, K for the finest ([RQT] section 3). */
 int rqt_vertex_level(const rqt_lattice *lattice, rqt_vertex v);
 #define RQT_RANKS (2 * RQT_MAX_K + 2)
-/* 2 * scale for vertices on the sides of cells, 2 * scale + 1 for centres of cells and for the corners: the parents
- * of a vertex have higher ranks than it. */
+/* 2 * scale for vertices on the sides of cells, 2 * scale + 1 for centres of cells (corners: K for their scale,
+ * either way): the parents of a vertex have higher ranks than it. */
 int rqt_vertex_rank(const rqt_lattice *lattice, rqt_vertex v);
 /* The vertices that v depends on, at most two; returns their number: 0 for corners, 1 for a midpoint of the
  * root's border, 2 otherwise. */
