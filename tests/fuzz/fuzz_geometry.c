@@ -251,6 +251,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         if (went_well(rqt_region_create(take_between(&in, 0, 31) ? geometry : NULL, &placement, &l, &a, &region),
                       &heap)) {
             in = rest;
+            HOLD(rqt_region_bytes(region) <= heap.live, "%zu bytes of %zu", rqt_region_bytes(region), heap.live);
             look(&in, region, &l);
             snap(&in, region, &l, &a, &heap);
         }
