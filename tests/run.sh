@@ -32,6 +32,8 @@ run_one() { # name command...: a line for people, and passed, failed, name for t
 export -f run_one
 
 export RQT=$PWD/$BUILD/rqt RQT_SO=$PWD/$BUILD/rqt.so
+# Random tests begin from this number, so that a run can be repeated; any other one asks other questions.
+export RQT_SEED=${RQT_SEED:-1}
 export ASAN_OPTIONS=detect_leaks=1:allocator_may_return_null=1
 export TSAN_OPTIONS=suppressions=$PWD/tests/threads.supp
 if [ "$mode" = programs ]; then

@@ -160,11 +160,11 @@ static inline void take_options(input *in, char *text, size_t room) {
                                   options[which].values[take_between(in, 0, 7)]);
         } else {
             n += (size_t)snprintf(text + n, room - n, "\"detail\":[");
-            for (int places = take_between(in, 0, 3); places > 0; places--)
+            for (int more = take_between(in, 0, 3); more > 0; more--)
                 n += (size_t)snprintf(text + n, room - n, "[%s,%s]%s",
                                       geometries[take_bits(in, 1) % (sizeof geometries / sizeof *geometries)],
                                       tolerances[take_bits(in, 1) % (sizeof tolerances / sizeof *tolerances)],
-                                      places > 1 ? "," : "");
+                                      more > 1 ? "," : "");
             n += (size_t)snprintf(text + n, room - n, "]");
         }
         n += (size_t)snprintf(text + n, room - n, i > 1 ? "," : "}'");
