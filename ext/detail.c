@@ -264,6 +264,7 @@ static int has_rows(const source *s, bool *has) {
 static int keep(request *r, const source *s) {
     places *p = r->places;
     const uint64_t state = store_state(r->store);
+    /* Pointers among them. NOLINTNEXTLINE(bugprone-sizeof-expression) */
     size_t bytes = sizeof *p + p->capacity * (sizeof *p->regions + sizeof *p->items);
     bool own;
     int code = SQLITE_OK;

@@ -201,7 +201,7 @@ static int patch_mesh(request *r, const mesh_format *f, uint8_t **bytes, size_t 
 void call_mesh(sqlite3_context *result, int count, sqlite3_value **arguments) {
     char *error = NULL;
     request r = {0};
-    mesh_format f;
+    mesh_format f = {MESH_OTHER, FORMAT_OBJ, false, ""};
     uint8_t *bytes = NULL;
     size_t size = 0;
     int code = read_format(arguments[2], &f, &error);

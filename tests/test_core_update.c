@@ -25,7 +25,8 @@ typedef struct table {
     rqt_codec *codec;
     rqt_block block;
     size_t reads, summaries, blocks_written, summaries_written;
-    size_t fail_read; /* the read that fails, from 1; 0: none */
+    size_t fail_read;               /* the read that fails, from 1; 0: none */
+    size_t block_reads, alien_read; /* the read of a block that gives one of another width, from 1; 0: none */
     uint8_t *buffer;
 } table;
 
@@ -132,6 +133,7 @@ static const rqt_block *read_block(void *context, rqt_block_number number) {
     assert_int_equal(rqt_block_decode(t->codec, r->bytes, r->size, &t->block), RQT_OK);
     assert_int_equal(rqt_summary_decode(r->summary, RQT_SUMMARY_BYTES, &summary), RQT_OK);
     rqt_block_set_corners(&t->block, &summary);
+    if (++t->block_reads == t->alien_read) t->block.width--;
     return &t->block;
 }
 
@@ -195,7 +197,7 @@ static rqt_status table_update(table *t, const patch *p, rqt_update_result *resu
                                .write = write_block,
                                .context = t};
     for (size_t n = 0; n < t->count; n++) t->rows[n].written = 0;
-    t->blocks_written = t->summaries_written = t->summaries = t->reads = 0;
+    t->blocks_written = t->summaries_written = t->summaries = t->reads = t->block_reads = 0;
     const rqt_status status = rqt_update_run(&update, &test_allocator, result);
     if (status == RQT_OK) t->statistics = result->after;
     return status;
@@ -384,6 +386,30 @@ static void voids_at_the_raster_s_edge_are_built_alike(void **state) {
     }
 }
 
+/* A peak in the corner: in coarse blocks a vertex past the raster is kept that none of the quarters keeps, nor
+ * another one that stands for the same sample. Both edges, with the sample in the rectangle and out of it. */
+static void a_vertex_past_the_raster_has_the_sample_it_stands_for(void **state) {
+    (void)state;
+    const int extent[3][2] = {{17, 24}, {24, 17}, {25, 14}};
+    for (int n = 0; n < 3; n++)
+        for (int whole = 0; whole < 2; whole++) {
+            const int width = extent[n][0], height = extent[n][1];
+            raster r = raster_from_memory(width, height, NULL, NULL, &UNIT_METRE, "slope");
+            for (int at = 0; at < width * height; at++) r.q[at] = 100 + at % width;
+            table t = table_build(&r, 3);
+            patch p = whole ? patch_make(&r, 0, 0, width, height) : patch_make(&r, width - 1, height - 1, 1, 1);
+            for (int at = 0; at < p.width * p.height; at++) p.q[at]++;
+            p.q[p.width * p.height - 1] += 50;
+            rqt_update_result result;
+            assert_int_equal(table_update(&t, &p, &result), RQT_OK);
+            exchange(&r, &p);
+            check_equals_build(&t, &r, whole ? "all" : "corner", &p);
+            patch_free(&p);
+            table_free(&t);
+            raster_free(&r);
+        }
+}
+
 static void check_same_rows(const table *a, const table *b, const char *what) {
     assert_int_equal(a->count, b->count);
     for (size_t n = 0; n < a->count; n++)
@@ -491,21 +517,16 @@ static void a_plateau_is_not_searched_through(void **state) {
     raster_free(&r);
 }
 
-static void F48_every_allocation_and_every_read_may_fail(void **state) {
-    (void)state;
-    random_begin(__func__);
-    raster r = raster_make(SURFACE_HILLS, 37, 41, 5);
-    table t = table_build(&r, 2);
-    patch p = random_patch(&r);
+static void check_failures(const raster *r, const patch *p) {
     rqt_update_result result;
-    size_t first = 1, failed = 0;
-    for (;; first++) {
-        table fresh = table_build(&r, 2);
+    size_t failed = 0;
+    for (size_t first = 1;; first++) {
+        table fresh = table_build(r, 2);
         test_heap.calls = test_heap.failures = 0;
-        test_heap.fail_from = first;
-        test_heap.fail_to = SIZE_MAX;
+        /* One alone: what comes after it must not have to tell. */
+        test_heap.fail_from = test_heap.fail_to = first;
         /* The codec is the table's: only rqt_update_run asks the heap. */
-        const rqt_status status = table_update(&fresh, &p, &result);
+        const rqt_status status = table_update(&fresh, p, &result);
         test_heap.fail_from = 0;
         const bool refused = test_heap.failures > 0;
         assert_int_equal(status, refused ? RQT_NO_MEMORY : RQT_OK);
@@ -515,16 +536,61 @@ static void F48_every_allocation_and_every_read_may_fail(void **state) {
     }
     CHECK(failed > 20, "only %zu requests for memory", failed);
     for (size_t read = 1;; read += 1 + read / 8) {
-        table fresh = table_build(&r, 2);
+        table fresh = table_build(r, 2);
         fresh.fail_read = read;
-        const rqt_status status = table_update(&fresh, &p, &result);
+        const rqt_status status = table_update(&fresh, p, &result);
         const bool refused = fresh.reads >= read;
         assert_int_equal(status, refused ? RQT_READ_FAILED : RQT_OK);
         table_free(&fresh);
         if (!refused) break;
     }
+}
+
+static void F48_every_allocation_and_every_read_may_fail(void **state) {
+    (void)state;
+    random_begin(__func__);
+    raster r = raster_make(SURFACE_HILLS, 37, 41, 5);
+    patch p = random_patch(&r);
+    check_failures(&r, &p);
     patch_free(&p);
+    raster_free(&r);
+}
+
+/* A bowl errs more the larger a triangle is, so every cell of one promises more than what is known: the heap of the
+ * search is asked for. */
+static void F48_a_search_without_memory_is_reported(void **state) {
+    (void)state;
+    raster r = raster_from_memory(37, 41, NULL, NULL, &UNIT_METRE, "bowl");
+    for (int n = 0; n < 37 * 41; n++) r.q[n] = n % 37 * (n % 37) + n / 37 * (n / 37);
+    patch p = patch_make(&r, 18, 20, 1, 1);
+    p.q[0]++;
+    table t = table_build(&r, 2);
+    rqt_update_result result;
+    assert_int_equal(table_update(&t, &p, &result), RQT_OK);
+    CHECK(result.cells > 20, "only %lld cells were looked at", (long long)result.cells);
     table_free(&t);
+    check_failures(&r, &p);
+    patch_free(&p);
+    raster_free(&r);
+}
+
+/* The last block that is read is the root's, which is made anew: it comes with the width of another place. */
+static void a_block_of_another_place_is_damage(void **state) {
+    (void)state;
+    raster r = raster_from_memory(37, 41, NULL, NULL, &UNIT_METRE, "bowl");
+    for (int n = 0; n < 37 * 41; n++) r.q[n] = n % 37 * (n % 37) + n / 37 * (n / 37);
+    patch p = patch_make(&r, 0, 0, 37, 41);
+    for (int n = 0; n < 37 * 41; n++) p.q[n] *= 3;
+    table t = table_build(&r, 2), alien = table_build(&r, 2);
+    rqt_update_result result;
+    assert_int_equal(table_update(&t, &p, &result), RQT_OK);
+    CHECK(row_of(&t, 1)->written, "the root is written");
+    alien.alien_read = t.block_reads;
+    assert_int_equal(table_update(&alien, &p, &result), RQT_CORRUPT);
+    assert_int_equal(alien.blocks_written + alien.summaries_written, 0);
+    table_free(&t);
+    table_free(&alien);
+    patch_free(&p);
     raster_free(&r);
 }
 
@@ -584,11 +650,14 @@ int main(void) {
         TEST(F23_an_update_equals_a_build_in_every_block_and_summary),
         TEST(F40_an_update_equals_a_build_for_every_small_extent),
         TEST(voids_at_the_raster_s_edge_are_built_alike),
+        TEST(a_vertex_past_the_raster_has_the_sample_it_stands_for),
         TEST(F22_an_update_back_restores_every_byte),
         TEST(F44_the_order_of_two_updates_apart_does_not_matter),
         TEST(an_update_reads_what_is_near_and_little_else),
         TEST(a_plateau_is_not_searched_through),
         TEST(F48_every_allocation_and_every_read_may_fail),
+        TEST(F48_a_search_without_memory_is_reported),
+        TEST(a_block_of_another_place_is_damage),
         TEST(what_cannot_be_is_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -708,6 +708,86 @@ static void test_every_refused_allocation_is_reported(void **state) {
                      RQT_INVALID); /* no message wanted */
 }
 
+/* What rqt_geometry_repeat makes of a text, as a line of text. */
+static const char *repeated(const char *text, double period, double low, double high) {
+    rqt_geometry *g;
+    assert_int_equal(parse(text, strlen(text), true, &g), RQT_OK);
+    assert_int_equal(rqt_geometry_repeat(g, period, low, high), RQT_OK);
+    const char *said = describe(g);
+    rqt_geometry_free(g);
+    return said;
+}
+
+static void F25_a_geometry_is_repeated_around_the_world(void **state) {
+    (void)state;
+    assert_string_equal(repeated("POINT(10 50)", 360, 0, 360), "P(10 50)");
+    assert_string_equal(repeated("POINT(-10 50)", 360, 0, 360), "P(-10 50) P(350 50)");
+    assert_string_equal(repeated("POINT(350 50)", 360, -180, 180), "P(350 50) P(-10 50)");
+    /* The interval is closed, and a box that touches it is on it. */
+    assert_string_equal(repeated("POINT(-180 1)", 360, -180, 180), "P(-180 1) P(180 1)");
+    assert_string_equal(repeated("LINESTRING(-20 1,0 2)", 360, 360, 361), "L(-20 1,0 2) L(340 1,360 2)");
+    assert_string_equal(repeated("LINESTRING(-20 1,-1 2)", 360, 360, 361), "L(-20 1,-1 2)");
+    /* The box counts, not the points: the line passes over the interval. */
+    assert_string_equal(repeated("LINESTRING(-20 1,20 2)", 360, 355, 357), "L(-20 1,20 2) L(340 1,380 2)");
+    /* As often as it meets, west to east, with holes; members behind the members that were read, each by itself. */
+    assert_string_equal(
+        repeated("GEOMETRYCOLLECTION(POLYGON((1 0,9 0,9 8,1 0),(7 1,8 1,8 2,7 1)),POINT(15 3))", 20, -20, 30),
+        "A(1 0,9 0,9 8,1 0)(7 1,8 1,8 2,7 1) P(15 3) A(-19 0,-11 0,-11 8,-19 0)(-13 1,-12 1,-12 2,-13 1) "
+        "A(21 0,29 0,29 8,21 0)(27 1,28 1,28 2,27 1) P(-5 3)");
+    /* Nobody's longitude. */
+    assert_string_equal(repeated("MULTIPOINT((1080 1),(1081 1),(-1080 1),(-1081 1))", 360, 0, 0),
+                        "P(1080 1) P(1081 1) P(-1080 1) P(-1081 1) P(0 1) P(0 1)");
+    assert_string_equal(repeated("POINT EMPTY", 360, -180, 180), "");
+}
+
+/* All turns are tried, in integers. */
+static void copies_are_at_every_multiple_that_meets(void **state) {
+    (void)state;
+    uint64_t bits = 4711;
+    char text[100], expected[8192];
+    for (int round = 0; round < 3000; round++) {
+        int number[4];
+        for (int n = 0; n < 4; n++) {
+            bits = bits * 6364136223846793005u + 1442695040888963407u;
+            number[n] = (int)(bits >> 33) % 73 - 36;
+        }
+        const int period = 1 + round % 12, a = number[0], b = number[1];
+        const int low = number[2] < number[3] ? number[2] : number[3], high = number[2] + number[3] - low;
+        const int least = a < b ? a : b, most = a < b ? b : a;
+        (void)sprintf(text, "LINESTRING(%d 5,%d 6)", a, b);
+        size_t n = (size_t)sprintf(expected, "L(%d 5,%d 6)", a, b);
+        for (int turn = -100; turn <= 100; turn++) {
+            const int by = turn * period;
+            const bool meets = least + by <= high && most + by >= low;
+            if (turn == 0 || !meets || least < -3 * period || most > 3 * period) continue;
+            n += (size_t)sprintf(expected + n, " L(%d 5,%d 6)", a + by, b + by);
+        }
+        assert_string_equal(repeated(text, period, low, high), expected);
+    }
+}
+
+static void a_repetition_without_memory_is_reported(void **state) {
+    (void)state;
+    static const char text[] = "POLYGON((1 0,9 0,9 8,1 0),(7 1,8 1,8 2,7 1))";
+    for (size_t fail = 1;; fail++) {
+        rqt_geometry *g;
+        test_heap.fail_at = 0;
+        assert_int_equal(parse(text, strlen(text), true, &g), RQT_OK);
+        test_heap.calls = 0;
+        test_heap.fail_at = fail;
+        const rqt_status status = rqt_geometry_repeat(g, 1000, -100000, 100000);
+        const bool refused = test_heap.calls >= fail;
+        assert_int_equal(status, refused ? RQT_NO_MEMORY : RQT_OK);
+        if (!refused) assert_int_equal(rqt_geometry_members(g), 200);
+        rqt_geometry_free(g);
+        if (!refused) {
+            assert_true(fail > 6);
+            break;
+        }
+    }
+    test_heap.fail_at = 0;
+}
+
 #define TEST(f) cmocka_unit_test_setup_teardown(f, begin_test, end_test)
 
 int main(void) {
@@ -724,6 +804,9 @@ int main(void) {
         TEST(test_junk_does_no_harm),
         TEST(test_nesting_is_limited),
         TEST(test_every_refused_allocation_is_reported),
+        TEST(F25_a_geometry_is_repeated_around_the_world),
+        TEST(copies_are_at_every_multiple_that_meets),
+        TEST(a_repetition_without_memory_is_reported),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -212,12 +212,16 @@ static void put_all(FILE *file, const import_findings *f) {
 /* It is written beside its place, and then put there. NULL after a sentence. */
 static char *part_of(const import_job *job) {
     const char *path = job->options->report;
-    char *part = malloc(strlen(path) + sizeof ".part");
+    static const char ending[] = ".part";
+    const size_t length = strlen(path);
+    char *part = malloc(length + sizeof ending);
     if (!part) {
         import_no_memory(job, "writing the report");
         return NULL;
     }
-    return strcat(strcpy(part, path), ".part");
+    memcpy(part, path, length);
+    memcpy(part + length, ending, sizeof ending);
+    return part;
 }
 
 static bool refuse_report(const import_job *job, const char *why) {

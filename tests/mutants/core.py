@@ -122,4 +122,6 @@ MUTANTS = [
      "return (int64_t)floor(units);", "test_core_query", "queries_equal_the_global_walk_on_small_rasters"),
     ("region: touching counts as crossing", "src/core/region_edges.c", "<= 0", "< 0", "test_region",
      "test_polygons_meet_as_the_oracle_says"),
+    ("region: a copy that touches the east of the box is left out", "src/core/geometry.c", "turn <= last", "turn < last",
+     "test_geometry", "copies_are_at_every_multiple_that_meets"),
 ]
