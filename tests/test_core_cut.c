@@ -408,6 +408,67 @@ static void F26_polygons_of_all_kinds_are_cut_to_their_area(void **state) {
     }
 }
 
+/* Does a closed triangle meet a segment? A line parallel to a side of either, with them strictly on its two sides,
+ * says no. */
+static bool meets_segment(const place t[3], place a, place b) {
+    bool left = false, right = false;
+    for (int i = 0; i < 3; i++) {
+        const place p = t[i], q = t[(i + 1) % 3], r = t[(i + 2) % 3];
+        const bool up = turn(p, q, r) > 0;
+        const __int128 of_a = turn(p, q, a), of_b = turn(p, q, b);
+        if (up ? of_a < 0 && of_b < 0 : of_a > 0 && of_b > 0) return false;
+        left |= turn(a, b, p) >= 0;
+        right |= turn(a, b, p) <= 0;
+    }
+    return left && right;
+}
+
+/* A line cannot be cut out: beside polygons that are, it takes the leaves that it meets as they are. */
+static void a_line_beside_polygons_takes_whole_leaves(void **state) {
+    (void)state;
+    random_begin(__func__);
+    for (int n = 0; n < 20; n++) {
+        model m;
+        database d;
+        model_create(&m, raster_make(SURFACE_HILLS, random_between(12, 30), random_between(12, 30), -1));
+        assert_int_equal(database_create(&d, &m, 2, &test_allocator), RQT_OK);
+        static shape s;
+        while (random_shape(&s, m.r.width, m.r.height) != 1) {
+        } /* rectangles */
+        const place a = {random_between(0, 11), random_between(0, 11)}, b = {random_between(0, 11), 11 - a.y};
+        char text[sizeof s.text + 100];
+        (void)snprintf(text, sizeof text, "GEOMETRYCOLLECTION(LINESTRING(%d %d,%d %d),%s)", (int)a.x, (int)a.y,
+                       (int)b.x, (int)b.y, s.text);
+        rqt_region *region = region_of_shape(text, &d.lattice);
+        rqt_patch patch;
+        rqt_cut cut;
+        assert_int_equal(database_query(&d, region, rqt_code_floor(5), RQT_SELECT_THRESHOLD, RQT_OUTLINE_EXACT,
+                                        &test_allocator, &patch),
+                         RQT_OK);
+        assert_int_equal(rqt_cut_make(&patch, region, &d.lattice, &test_allocator, NULL, NULL, &cut), RQT_OK);
+        long double wanted = 0;
+        for (size_t t = 0; t < patch.triangle_count; t++) {
+            oracle_point leaf[3];
+            place corner[3];
+            for (int k = 0; k < 3; k++) {
+                const rqt_patch_vertex *v = &patch.vertices[patch.triangles[3 * t + (size_t)k]];
+                leaf[k] = (oracle_point){v->col, v->row};
+                corner[k] = (place){v->col, v->row};
+            }
+            const __int128 twice = turn(corner[0], corner[1], corner[2]);
+            wanted +=
+                meets_segment(corner, a, b) ? (long double)(twice < 0 ? -twice : twice) / 2 : common_area(leaf, &s);
+        }
+        const long double area = check_mesh(&cut, d.lattice.K, "line");
+        CHECK(fabsl(area - wanted) <= 1e-9L, "%s: area %.15Lg, should be %.15Lg", text, area, wanted);
+        rqt_cut_free(&cut);
+        rqt_patch_free(&patch);
+        rqt_region_free(region);
+        database_free(&d, &test_allocator);
+        model_free(&m);
+    }
+}
+
 /* The faces tile the leaf, have areas, and neighbours know each other. */
 static void check_faces(const cut_faces *f) {
     const region_point *corner = f->points;
@@ -731,6 +792,7 @@ int main(void) {
         TEST(a_segment_passes_below_a_hanging_edge),
         TEST(faces_tile_the_leaf_whatever_rounding_does),
         TEST(neighbours_share_the_vertices_of_their_border),
+        TEST(a_line_beside_polygons_takes_whole_leaves),
         TEST(the_largest_terrains_and_regions),
         TEST(F48_no_memory_and_interrupt_leave_nothing),
         TEST(F26_polygons_of_all_kinds_are_cut_to_their_area),
