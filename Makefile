@@ -124,7 +124,7 @@ test: ## install, build, and pass every test (also under ASan and UBSan)
 	@./src/install-packages.sh build test
 	@$(MAKE) --no-print-directory -j2 products test-programs
 	@$(MAKE) --no-print-directory -j2 BUILD=$(BUILD)/sanitized OPTIMIZE=-O1 \
-	  SANITIZE="-fsanitize=address,undefined -fno-sanitize-recover=undefined" products test-programs fuzz-programs
+	  SANITIZE="-fsanitize=address,undefined -fno-sanitize-recover=undefined" test-programs fuzz-programs
 	@BUILD=$(BUILD) ./tests/run.sh
 
 test-quick: ## the tests without the sanitized build
