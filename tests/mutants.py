@@ -5,12 +5,17 @@ WORD: only the mutants whose description holds it. A mutant, in tests/mutants/*.
 program, test): the first occurrence of the text is replaced in a copy of the tree, the program is built and run there, and the
 mutant is caught when it fails and names that test (or hangs). The program is one of build/tests, or a script tests/*.py, which
 runs with the mutant's command and extension. A text that is not found is a failure too: the list has to follow the code.
+
+As many workers as there are processors, each with a copy of the tree; mutants of one program follow each other in one of them,
+whose objects are then mostly up to date. What was missed is said again at the end.
 """
 import glob
 import os
 import shutil
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
+from queue import Queue
 
 
 def read_mutants():
@@ -24,57 +29,81 @@ def read_mutants():
     return mutants
 
 
-def main():
-    build = sys.argv[1] if len(sys.argv) > 1 else "build"
-    only = sys.argv[2] if len(sys.argv) > 2 else ""
-    tree = os.path.join(build, "mutants")
-    shutil.rmtree(tree, ignore_errors=True)
+def copy_tree(build, tree):
+    """The sources and what was built of them, with their times: nothing is built again that did not change."""
     os.makedirs(tree)
     for name in ("src", "ext", "sql", "tests", "examples", "Makefile"):
         (shutil.copytree if os.path.isdir(name) else shutil.copy2)(name, os.path.join(tree, name))
-    # Objects are up to date with the sources they came from: times are kept.
     shutil.copytree(build, os.path.join(tree, "build"),
                     ignore=shutil.ignore_patterns("mutants", "sanitized", "threads", "coverage", "fuzz", "lint", "bench", "chart", "peers", "demo", "*.log"))
+
+
+def run_mutant(tree, mutant):
+    """What is wrong with it, or "" when it was caught."""
+    what, path, old, new, program, test = mutant
+    target = os.path.join(tree, path)
+    with open(path, encoding="utf-8") as f:
+        text = f.read()
+    if old not in text:
+        return "not found in " + path
     absolute = os.path.abspath(tree)
     environment = dict(os.environ, RQT_SEED="1", TMPDIR=absolute, RQT=absolute + "/build/rqt",
                        RQT_SO=absolute + "/build/rqt.so")
-    caught = missed = 0
-    for what, path, old, new, program, test in read_mutants():
-        if only not in what:
-            continue
-        target = os.path.join(tree, path)
-        with open(path, encoding="utf-8") as f:
-            text = f.read()
-        verdict = "not found in " + path
-        if old in text:
-            with open(target, "w", encoding="utf-8") as f:
-                f.write(text.replace(old, new, 1))
-            script = program.endswith(".py")
-            goal = "products" if script else "build/tests/" + program
-            made = subprocess.run(["make", "-s", "-j2", "WARNINGS=", goal], cwd=tree, capture_output=True, text=True)
-            verdict = "does not build:\n" + made.stderr[-1500:]
-            if made.returncode == 0:
-                try:
-                    command = ["/usr/bin/python3", "tests/" + program] if script else ["build/tests/" + program]
-                    ran = subprocess.run(command, cwd=tree, capture_output=True, text=True, errors="replace",
-                                         timeout=300 if script else 120, env=environment)
-                    output = ran.stdout + ran.stderr
-                    named = any(test in line and ("FAILED" in line or "ERROR" in line) for line in output.splitlines())
-                    red = ran.returncode != 0 and (named or ran.returncode < 0)
-                    verdict = "" if red else "SURVIVED " + program + (
-                        " (red, but not " + test + ")" if ran.returncode else "")
-                except subprocess.TimeoutExpired:
-                    verdict = ""
-            shutil.copy2(path, target)
-            os.utime(target)
-        if verdict:
-            missed += 1
-            print("MISSED  %-48s %s" % (what, verdict), flush=True)
-        else:
-            caught += 1
-            print("caught  %-48s by %s" % (what, test), flush=True)
-    print("%d passed, %d failed" % (caught, missed))
-    return missed != 0
+    with open(target, "w", encoding="utf-8") as f:
+        f.write(text.replace(old, new, 1))
+    try:
+        script = program.endswith(".py")
+        goal = "products" if script else "build/tests/" + program
+        made = subprocess.run(["make", "-s", "WARNINGS=", goal], cwd=tree, capture_output=True, text=True)
+        if made.returncode:
+            return "does not build:\n" + made.stderr[-1500:]
+        command = ["/usr/bin/python3", "tests/" + program] if script else ["build/tests/" + program]
+        ran = subprocess.run(command, cwd=tree, capture_output=True, text=True, errors="replace",
+                             timeout=300 if script else 120, env=environment)
+        output = ran.stdout + ran.stderr
+        named = any(test in line and ("FAILED" in line or "ERROR" in line) for line in output.splitlines())
+        if ran.returncode != 0 and (named or ran.returncode < 0):
+            return ""
+        return "SURVIVED " + program + (" (red, but not " + test + ")" if ran.returncode else "")
+    except subprocess.TimeoutExpired:
+        return ""
+    finally:
+        shutil.copy2(path, target)
+        os.utime(target)
+
+
+def main():
+    build = sys.argv[1] if len(sys.argv) > 1 else "build"
+    only = sys.argv[2] if len(sys.argv) > 2 else ""
+    folder = os.path.join(build, "mutants")
+    shutil.rmtree(folder, ignore_errors=True)
+    groups = {}
+    for mutant in read_mutants():
+        if only in mutant[0]:
+            groups.setdefault((mutant[4], mutant[1]), []).append(mutant)
+    trees = Queue()
+    for i in range(os.cpu_count() or 1):
+        tree = os.path.join(folder, str(i))
+        copy_tree(build, tree)
+        trees.put(tree)
+    missed = []
+
+    def run_group(group):
+        tree = trees.get()
+        for mutant in group:
+            verdict = run_mutant(tree, mutant)
+            if verdict:
+                missed.append("MISSED  %-48s %s" % (mutant[0], verdict))
+            print(missed[-1] if verdict else "caught  %-48s by %s" % (mutant[0], mutant[5]), flush=True)
+        trees.put(tree)
+        return len(group)
+
+    with ThreadPoolExecutor(trees.qsize()) as workers:
+        total = sum(workers.map(run_group, groups.values()))
+    for line in missed:
+        print(line)
+    print("%d passed, %d failed" % (total - len(missed), len(missed)))
+    return bool(missed)
 
 
 sys.exit(main())

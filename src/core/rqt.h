@@ -562,7 +562,8 @@ bool rqt_region_contains(const rqt_region *region, rqt_vertex sample);
  *
  *     e_sat(P) > threshold(P), or P is forced or an ancestor of a forced vertex, or (outline exact) it has the bit
  * x threshold(P) = the code of the least eps - lowering(rank of P), eps: that of the rule and those of all places
- *                    whose closed region meets the closed box of P; -1 where that is below 0
+ *                    whose closed region meets the closed box of P (and of a field's squares, below); -1 where that
+ *                    is below 0
  *     box(P)       = the square around P of half-width 3q for the centre of a cell of side 2q, else 2q, where q is
  * the largest power of two that divides both coordinates; it may reach past the raster
  *
@@ -594,6 +595,36 @@ rqt_status rqt_rule_force(rqt_rule *rule, rqt_vertex v);
  * R'. See border.c. is_interrupted may be NULL; RQT_INTERRUPTED: some are forced, and the rule is of no use. */
 rqt_status rqt_rule_force_border(rqt_rule *rule, const rqt_region *region, bool (*is_interrupted)(void *context),
                                  void *context);
+
+/* An eps for every place: a *field* cuts the root square into quarters of quarters, as finely as it is told to, and
+ * has an eps in each square that is left. To a rule its squares are places, but open ones: threshold(P) is the code
+ * of the least eps of all squares that have a point in common with the interior of box(P), where neither the rule's
+ * own eps nor its other places say less. A sample on the side of a square so gets the least eps of all squares
+ * there. Views (rqt_view.h) are such fields. */
+typedef struct rqt_field rqt_field;
+
+typedef struct rqt_square {
+    int32_t x, y, side; /* lattice; side a power of two, x and y multiples of it */
+} rqt_square;
+
+typedef enum rqt_field_step { RQT_FIELD_LEAF, RQT_FIELD_SPLIT, RQT_FIELD_FAIL } rqt_field_step;
+/* What becomes of a square: *eps (metres, not NaN, >= 0; infinity: nothing is asked for there) for all of it, or
+ * its quarters are asked for, each at once with all that is in it. A square of side 1 cannot be split:
+ * RQT_FIELD_SPLIT is an error there. Squares that hold no sample are not asked for. */
+typedef rqt_field_step rqt_field_decide(void *context, rqt_square square, double *eps);
+/* RQT_READ_FAILED after RQT_FIELD_FAIL; RQT_INVALID for an eps that is none. About 16 bytes a square. */
+rqt_status rqt_field_create(const rqt_lattice *lattice, const rqt_allocator *allocator, rqt_field_decide *decide,
+                            void *context, rqt_field **field);
+void rqt_field_free(rqt_field *field);
+/* Every eps becomes what it was when the field was made, times factor: > 0, finite. */
+rqt_status rqt_field_scale(rqt_field *field, double factor);
+/* The squares that are left, in Morton order; false: there is no nth. eps is rounded down to a code, as used. */
+size_t rqt_field_count(const rqt_field *field);
+bool rqt_field_square(const rqt_field *field, size_t n, rqt_square *square, double *eps);
+/* The least eps of the squares that have a point in common with the open box; infinity where there is none. */
+double rqt_field_least(const rqt_field *field, int32_t x0, int32_t y0, int32_t x1, int32_t y1);
+/* The field must outlive the rule, or the next call of this; NULL: none. After rqt_field_scale: say it again. */
+rqt_status rqt_rule_set_field(rqt_rule *rule, const rqt_field *field);
 
 /* The largest code that an error may have without the vertex being selected for it; -1: none. */
 int32_t rqt_rule_threshold(const rqt_rule *rule, rqt_vertex v);
@@ -898,4 +929,7 @@ uint64_t rqt_wire_digest(const rqt_patch *patch);
 #ifdef __cplusplus
 }
 #endif
+
+#include "rqt_view.h"
+
 #endif

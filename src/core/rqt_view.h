@@ -1,0 +1,86 @@
+/* rqt_view.h - cameras, and what they ask of a terrain: the rest of rqt.h.
+ *
+ * A view is a camera and a tolerance in pixels. It becomes a field (rqt.h, "rules"): each square of ground gets the
+ * eps that keeps what is drawn there within the tolerance on the screen. view.c has the proof.
+ *
+ * *Scene*: a space in metres, in which camera and terrain are: heights are exaggerated in it already. What makes a
+ * scene of a terrain's coordinates is the caller's business; here are only points.
+ *
+ * Sources: [ULRICH] "Rendering massive terrains using chunked level of detail control" and its predecessor on
+ * adaptive quadtrees (2000); [LINDSTROM] "Real-time, continuous level of detail rendering of height fields" (1996);
+ * [RQT] as in rqt.h; METHODS.md has the definitions of all named tests.
+ */
+#ifndef RQT_VIEW_H
+#define RQT_VIEW_H
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct rqt_camera {
+    double eye[3];
+    double forward[3], right[3], up[3]; /* unit, at right angles to each other; right = forward x up */
+    double width, height;               /* of the picture, pixels */
+    double focal;                       /* height / (2 tan(fovy / 2)), pixels */
+    double near, far; /* what is drawn has a depth along `forward` in near .. far; 0 <= near < far,
+                         far may be infinite */
+    double tau;       /* tolerance, pixels, > 0 */
+} rqt_camera;
+
+/* A camera at `eye` that looks along `direction` (any length but 0), rolled so that `vertical` (any length but 0)
+ * points upward in the picture; where the two are parallel, `ahead` does instead (and gives way to any other
+ * direction where it is parallel too). fovy: degrees, 0 < fovy < 180. Everything else is taken as it is: near, far,
+ * width, height, tau must have been set. RQT_INVALID, with a sentence, when the camera is none. */
+rqt_status rqt_camera_look(rqt_camera *camera, const double eye[3], const double direction[3],
+                           const double vertical[3], const double ahead[3], double fovy, rqt_message *message);
+
+/* Where a point of the scene is in the picture: x to the right, y downward, pixels, (0,0) the upper left corner.
+ * false: it is not drawn, for its depth is not in near .. far, or 0; or it is outside the picture (then xy is set).
+ */
+bool rqt_camera_project(const rqt_camera *camera, const double point[3], double xy[2]);
+
+/* A piece of the scene: all points p with |(p - centre) . up| <= half_height, and the rest of p - centre no longer
+ * than radius. At every point in it the direction in which heights are counted makes an angle of at most `tilt`
+ * (radians, 0 .. pi) with up. */
+typedef struct rqt_prism {
+    double centre[3], up[3]; /* up: unit */
+    double radius, half_height, tilt;
+} rqt_prism;
+
+/* What the tolerance allows the terrain whose samples are all in a piece. */
+typedef struct rqt_view_bound {
+    double eps;      /* metres of the scene: how far the mesh may be from a sample there */
+    bool shown;      /* may something of the mesh there be drawn, with that eps? */
+    double distance; /* a lower bound of how far the samples are from the eye */
+    double share;    /* of the eps that the piece as a whole costs against its best point, 0 .. 1: 1 is nothing; a
+                        square    with a small share is worth splitting */
+} rqt_view_bound;
+
+/* The guaranteed test. For every sample S of the piece and every mesh with a point M with |S - M| <= eps: when S or
+ * M is drawn (near .. far, inside the picture), their places in the picture (of the infinite picture plane; both
+ * have a depth > 0) are at most tau apart. eps is infinite where none of both can be drawn. */
+void rqt_view_tolerance(const rqt_camera *camera, const rqt_prism *prism, rqt_view_bound *bound);
+
+/* ---------------------------------------------------------------------------------------------- other tests --
+ * Tests of the literature, by name, for comparing: they guarantee nothing on the screen. Each says how large the
+ * error of its own metric may be in a piece; METHODS.md has definitions, sources and what had to be mended. */
+typedef enum rqt_view_test {
+    RQT_VIEW_GUARANTEED,
+    RQT_VIEW_ULRICH,    /* seed of chunked quadtrees: error against the Chebyshev distance to the piece's box */
+    RQT_VIEW_NODE,      /* size over distance, weighed by a plane fitted to the node */
+    RQT_VIEW_SPHERE,    /* error spheres */
+    RQT_VIEW_LINDSTROM, /* the vertical segment on the screen */
+    RQT_VIEW_LODMAP     /* [RQT]: one eps per patch, by distance and direction from the eye */
+} rqt_view_test;
+#define RQT_VIEW_TESTS 6
+
+/* "guaranteed", "ulrich", "node", "sphere", "lindstrom", "lodmap"; NULL when there is none. */
+const char *rqt_view_test_name(rqt_view_test test);
+/* The bound of any test; of RQT_VIEW_GUARANTEED that of rqt_view_tolerance. */
+void rqt_view_test_bound(rqt_view_test test, const rqt_camera *camera, const rqt_prism *prism,
+                         rqt_view_bound *bound);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
