@@ -14,7 +14,9 @@
 
 /* Vertices: with half of one, meshes have about 5 % more of them than with squares as small as can be, for four to
  * ten thousand squares. */
-#define WORTH_CUTTING 0.5
+#define WORTH_CUTTING 1.0
+
+#define ASKED_AT_A_TIME 16384 /* squares between two questions whether to go on: a few milliseconds */
 
 typedef struct square_list {
     rqt_square *items;
@@ -27,6 +29,7 @@ typedef struct builder {
     const store_terrain *terrain;
     store_relief relief[RQT_MAX_K + 1]; /* of the square at hand and of those around it, by level */
     square_list shown;
+    uint32_t asked; /* squares */
     int code;
     char **error;
 } builder;
@@ -117,16 +120,19 @@ static int find_relief(builder *b, rqt_square square, int level) {
 }
 
 /* How many vertices could be saved by cutting the square? A guess: errors fall by half from level to level, so with
- * the largest error e there are about (e/eps)^2; of these the share that is lost. */
+ * the largest error e there are about (e/eps)^2, but not more than samples; with the best eps that a part could
+ * have fewer (share 0: the eye may be in the square). */
 static double worth_of(const builder *b, rqt_square square, int level, const rqt_view_bound *bound) {
     const int beneath = level - (b->terrain->lattice.K - b->terrain->k);
     const double error = rqt_code_metres(b->relief[level].error) * b->view->scene.exaggeration;
-    const double finer = ldexp(error, beneath > 0 ? -beneath : 0) / bound->eps, all = square.side;
-    return (1 - bound->share) * fmin(finer * finer, all * all);
+    const double all = square.side, ratio = ldexp(error, beneath > 0 ? -beneath : 0) / bound->eps;
+    const double now = fmin(ratio, all), then = bound->share > 0 ? fmin(ratio * bound->share, all) : 0;
+    return now * now - then * then;
 }
 
 static rqt_field_step decide(void *context, rqt_square square, double *eps) {
     builder *b = context;
+    if (++b->asked % ASKED_AT_A_TIME == 0 && store_is_interrupted(b->store, &b->code)) return RQT_FIELD_FAIL;
     const view *v = b->view;
     const rqt_lattice *lattice = &b->terrain->lattice;
     int level = lattice->K;
