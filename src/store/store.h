@@ -84,6 +84,7 @@ typedef struct store_query_options {
      * added: exact, local, wedgie, euclid; minimal is SQLITE_ERROR. */
     rqt_rule *rule;
     bool wants_leaves; /* fill patch->leaves; with RQT_PRODUCT_TRIANGLES only */
+    bool only_numbers; /* of reads: number alone, the rest 0. To say what each was takes as long as the query */
 } store_query_options;
 
 /* One row per block that answered, in Morton order. */
