@@ -211,6 +211,13 @@ typedef struct painting {
     open_box box; /* of all cells */
 } painting;
 
+/* n values of the same. Short rows, most of them: two, or a power of two. */
+static inline void fill(uint16_t *row, int32_t n, uint16_t value) {
+    const uint64_t four = value * UINT64_C(0x0001000100010001);
+    for (; n >= 4; n -= 4, row += 4) memcpy(row, &four, 8);
+    for (; n > 0; n--) *row++ = value;
+}
+
 static void paint_node(const painting *p, const node *n, rqt_square s) {
     const open_box *box = &p->box;
     if (n->least == RQT_CODE_INFINITY || s.x >= box->x1 || s.x + s.side <= box->x0 || s.y >= box->y1 ||
@@ -227,10 +234,8 @@ static void paint_node(const painting *p, const node *n, rqt_square s) {
     const int32_t right = s.x + s.side < box->x1 ? (s.x + s.side - box->x0) / side : p->cells->n,
                   bottom = s.y + s.side < box->y1 ? (s.y + s.side - box->y0) / side : p->cells->n;
     const uint16_t value = p->value(p->context, n->least);
-    for (int32_t y = top; y < bottom; y++) {
-        uint16_t *row = p->painted + (size_t)y * (size_t)p->cells->n;
-        for (int32_t x = left; x < right; x++) row[x] = value;
-    }
+    for (int32_t y = top; y < bottom; y++)
+        fill(p->painted + (size_t)y * (size_t)p->cells->n + left, right - left, value);
 }
 
 void field_paint(const rqt_field *field, const field_cells *cells,
@@ -239,6 +244,6 @@ void field_paint(const rqt_field *field, const field_cells *cells,
     const painting p = {field,   cells,   value,
                         context, painted, {cells->x, cells->y, cells->x + across, cells->y + across}};
     const uint16_t nothing = value(context, RQT_CODE_INFINITY);
-    for (size_t i = 0; i < (size_t)cells->n * (size_t)cells->n; i++) painted[i] = nothing;
+    fill(painted, cells->n * cells->n, nothing);
     paint_node(&p, &field->nodes[0], root_of(field));
 }

@@ -70,7 +70,10 @@ void rule_limits(const rqt_rule *rule, const rqt_block_place *place, int k, uint
         side_windows(grid, n, columns, windows);
         for (size_t y = 0; y <= cells; y++) {
             uint16_t *const row = limits + y * step * across;
-            for (size_t x = 0; x <= cells; x++) row[x * step] = windows[y * n + x];
+            if (step == 1)
+                memcpy(row, windows + y * n, across * sizeof *row);
+            else
+                for (size_t x = 0; x <= cells; x++) row[x * step] = windows[y * n + x];
         }
         a.rank++;
         if (rule_lowers(rule)) field_paint(field, &where, limit_of, &a, grid);
