@@ -59,14 +59,16 @@ static double furthest(const sight *s, const rqt_prism *prism, const double n[3]
            prism->radius * sqrt(fmax(0, dot(n, n) - upward * upward));
 }
 
+/* Is a part of it on the inner side of every plane of the frustum? */
 static bool is_before(const sight *s, const rqt_prism *prism, const rqt_camera *camera) {
-    const double back[3] = {-camera->forward[0], -camera->forward[1], -camera->forward[2]};
-    if (furthest(s, prism, camera->forward) < camera->near || -furthest(s, prism, back) > camera->far) return false;
+    double inward[3];
+    for (int i = 0; i < 3; i++) inward[i] = -camera->forward[i];
+    if (furthest(s, prism, inward) < -camera->far || furthest(s, prism, camera->forward) < camera->near)
+        return false;
     for (int side = 0; side < 4; side++) {
-        const double *across = side < 2 ? camera->right : camera->up,
-                     half = (side < 2 ? camera->width : camera->height) / 2,
+        const double *const across = side < 2 ? camera->right : camera->up;
+        const double half = (side < 2 ? camera->width : camera->height) / 2,
                      f = side & 1 ? -camera->focal : camera->focal;
-        double inward[3];
         for (int i = 0; i < 3; i++) inward[i] = half * camera->forward[i] + f * across[i];
         if (furthest(s, prism, inward) < 0) return false;
     }
