@@ -296,7 +296,9 @@ static void what_is_behind_the_eye_is_left_out(void **state) {
 /* An eye in a box, on a vertex, below ground, 10^9 m away, without end: a number. */
 static void F31_strange_eyes_get_a_number(void **state) {
     (void)state;
-    const double eyes[][3] = {{0, 0, 0}, {0, 0, -5}, {0, 0, 1e9}, {1e9, -1e9, 1e-9}, {1e300, 0, 0}, {0, 0, 5e-324}};
+    const double eyes[][3] = {{0, 0, 0},         {0, 0, -5},    {0, 0, 1e9},
+                              {1e9, -1e9, 1e-9}, {1e300, 0, 0}, {1e300, 1e300, 1e300},
+                              {0, 0, 5e-324}};
     for (size_t e = 0; e < sizeof eyes / sizeof *eyes; e++) {
         const double directions[][3] = {{0, 0, -1}, {0, 1, 0}, {-1, 1, 0}, {0, 0, 1}};
         for (int d = 0; d < 4; d++) {
