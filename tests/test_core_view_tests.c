@@ -325,6 +325,30 @@ static void F31_strange_eyes_get_a_number(void **state) {
     assert_true(bound_of(RQT_VIEW_LINDSTROM, &c, &p).eps == 0);
 }
 
+/* A scene and the same 10^7 m further north and east: what is near the eye is told as exactly. */
+static void F34_far_from_the_origin_a_test_says_the_same(void **state) {
+    (void)state;
+    random_begin("far off");
+    const double far_off[3] = {1e7, 1e7, 4000};
+    for (int round = 0; round < 2000; round++) {
+        rqt_camera c = random_camera();
+        const rqt_view_piece p = random_piece(&c);
+        rqt_camera there = c;
+        rqt_view_piece moved = p;
+        for (int i = 0; i < 3; i++) {
+            there.eye[i] += far_off[i];
+            moved.prism.centre[i] += far_off[i];
+        }
+        for (int t = 0; t < RQT_VIEW_TESTS; t++) {
+            const rqt_view_bound a = bound_of((rqt_view_test)t, &c, &p),
+                                 b = bound_of((rqt_view_test)t, &there, &moved);
+            if (a.shown != b.shown || t == RQT_VIEW_LINDSTROM) continue; /* on the frustum's border; over the eye */
+            CHECK(a.eps == b.eps || fabs(a.eps - b.eps) <= 1e-6 * (1 + a.eps + a.distance),
+                  "%s: %.17g, and far off %.17g", rqt_view_test_name((rqt_view_test)t), a.eps, b.eps);
+        }
+    }
+}
+
 /* ------------------------------------------------------------------------------------- counterexamples -- */
 
 /* Pixels from a sample to a point at `rise` metres above it; infinite where that is behind the eye. */
@@ -412,6 +436,7 @@ int main(void) {
         TEST(a_piece_gets_the_least_of_its_points_and_is_shown_with_one),
         TEST(what_is_behind_the_eye_is_left_out),
         TEST(F31_strange_eyes_get_a_number),
+        TEST(F34_far_from_the_origin_a_test_says_the_same),
         TEST(F32_named_tests_break_tau_off_the_axis),
         TEST(F33_lindstrom_asks_nothing_straight_down),
         TEST(a_middle_is_not_where_a_piece_is_nearest),

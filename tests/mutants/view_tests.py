@@ -42,6 +42,9 @@ MUTANTS = [
     ("tests of views: F32 the guaranteed test is another's", TESTS,
      "    if (test == RQT_VIEW_GUARANTEED) {\n", "    if (test == RQT_VIEW_GUARANTEED) test = RQT_VIEW_SPHERE;\n    if (test == RQT_VIEW_GUARANTEED) {\n",
      "test_core_view_tests", "F32_named_tests_break_tau_off_the_axis"),
+    ("tests of views: F34 the eye is subtracted in single precision", TESTS,
+     "prism->centre[i] - camera->eye[i]", "(double)((float)prism->centre[i] - (float)camera->eye[i])",
+     "test_core_view_tests", "F34_far_from_the_origin_a_test_says_the_same"),
     # the fitted plane
     ("fit: planes do not tilt south", "src/core/fit.c", "f.gy = (f.yz * f.xx - f.xz * f.xy) / area;", "f.gy = f.yz / f.yy;",
      "test_core_metric", FIT),
