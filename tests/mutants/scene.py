@@ -29,8 +29,6 @@ MUTANTS = [
      SQL, "what is drawn is within tau"),
     ("scene: what may be seen is left out of the region", "ext/view_field.c", "if (!bound.shown || add_square", "if (!bound.shown || square.side < 9 || add_square",
      SQL, "every sample that is drawn has its triangle"),
-    ("scene: relief of the square before", "ext/view_field.c", "level == 0 ? store_relief_of_all(t) : b->relief[level - 1];",
-     "level == 0 ? store_relief_of_all(t) : b->relief[b->asked % 2 ? level : level - 1];", SQL, "what is drawn is within tau"),
     ("camera: yaw goes to the west", "ext/camera.c", "combine(sin(yaw), east", "combine(-sin(yaw), east", SQL, "what is drawn is within tau"),
     ("camera: pitch is downward", "ext/camera.c", "sin(pitch), up, direction", "-sin(pitch), up, direction", SQL, "something is seen"),
     ("camera: roll the other way", "ext/camera.c", "words->roll * DEGREE", "-words->roll * DEGREE", SQL, "every sample that is drawn has its triangle"),
