@@ -231,17 +231,24 @@ rqt_code field_node_least(const rqt_field *field, field_node at) {
     return field->nodes[at].least;
 }
 
-void field_halve(const rqt_field *field, const field_node nine[9], field_node halves[6][6], rqt_code least[6][6]) {
+/* The quarter c of a square that is cut, else the square. */
+static inline field_node part_of(const node *nodes, field_node at, int c) {
+    return nodes[at].kind == SPLIT ? nodes[at].first + (uint32_t)c : at;
+}
+
+void field_halve(const rqt_field *field, const field_node nine[9], rqt_code least[6][6]) {
     const node *const nodes = field->nodes;
     for (int v = 0; v < 3; v++)
         for (int u = 0; u < 3; u++) {
             const field_node at = nine[3 * v + u];
-            const bool is_split = nodes[at].kind == SPLIT;
-            const field_node first = is_split ? nodes[at].first : at;
-            for (int c = 0; c < 4; c++) {
-                const field_node part = first + (is_split ? (field_node)c : 0);
-                halves[2 * v + (c >> 1)][2 * u + (c & 1)] = part;
-                least[2 * u + (c & 1)][2 * v + (c >> 1)] = nodes[part].least;
-            }
+            for (int c = 0; c < 4; c++)
+                least[2 * u + (c & 1)][2 * v + (c >> 1)] = nodes[part_of(nodes, at, c)].least;
         }
+}
+
+void field_around_quarter(const rqt_field *field, const field_node nine[9], int c, field_node around[9]) {
+    for (int j = 0; j < 9; j++) {
+        const int v = 1 + (c >> 1) + j / 3, u = 1 + (c & 1) + j % 3; /* of the six by six */
+        around[j] = part_of(field->nodes, nine[v / 2 * 3 + u / 2], (u & 1) + 2 * (v & 1));
+    }
 }

@@ -19,22 +19,22 @@
 typedef struct choosing {
     const rqt_rule *rule;
     const rqt_field *field;
-    const rqt_code *error;
-    const uint8_t *flags;
+    const rqt_block *block;
     uint8_t *chosen;
     uint32_t n; /* vertices a side */
     uint8_t mask, all;
 } choosing;
 
 static inline bool may_be_selected(const choosing *c, uint32_t place, int32_t threshold) {
-    return c->error[place] > threshold || (c->flags[place] & c->mask);
+    return c->block->error[place] > threshold || (c->mask && (c->block->flags[place] & c->mask));
 }
 
 static inline bool choose_place(choosing *c, uint32_t place, rqt_code code, int rank) {
     if (c->chosen[place]) return true; /* from the other side */
     if (!may_be_selected(c, place, rule_field_threshold(c->rule, code, rank))) return false;
     c->chosen[place] = 1;
-    c->all &= c->flags[place];
+    c->all &= c->block->flags[place];
+    __builtin_prefetch(&c->block->q[place]); /* is wanted when the walk is done */
     return true;
 }
 
@@ -76,11 +76,10 @@ static void choose_around(choosing *c, uint32_t middle, uint32_t half, int rank,
     for (int i = 0; i < 4; i++) may |= may_be_selected(c, side[i], threshold);
     /* A quarter's centre depends on the middles of two sides. */
     if (!may) return;
-    for (int i = 0; i < 4; i++) __builtin_prefetch(&c->error[centre[i]]);
+    for (int i = 0; i < 4; i++) __builtin_prefetch(&c->block->error[centre[i]]);
 
-    field_node halves[6][6];
     rqt_code codes[6][6]; /* column by column */
-    field_halve(c->field, nine, halves, codes);
+    field_halve(c->field, nine, codes);
     column_codes of[6];
     for (int u = 0; u < 6; u++) of[u] = codes_of_column(codes[u]);
     choose_place(c, side[0], LEAST4(of, 1, north), rank - 1);
@@ -88,21 +87,29 @@ static void choose_around(choosing *c, uint32_t middle, uint32_t half, int rank,
     choose_place(c, side[2], LEAST4(of, 2, across), rank - 1);
     choose_place(c, side[3], LEAST4(of, 1, south), rank - 1);
     if (half == 1) return;
+    rqt_code code[4];
+    bool chosen[4];
     for (int i = 0; i < 4; i++) {
         const int u = i & 1, v = i >> 1;
-        if (!c->chosen[side[v ? 3 : 0]] || !c->chosen[side[u ? 2 : 1]]) continue;
-        const rqt_code code = LEAST3(of, 1 + u, quarter[v]);
-        if (!choose_place(c, centre[i], code, rank - 2)) continue;
+        code[i] = LEAST3(of, 1 + u, quarter[v]);
+        chosen[i] = c->chosen[side[v ? 3 : 0]] && c->chosen[side[u ? 2 : 1]] &&
+                    choose_place(c, centre[i], code[i], rank - 2);
+        if (!chosen[i]) continue;
+        __builtin_prefetch(&c->block->error[centre[i] - h * n]);
+        __builtin_prefetch(&c->block->error[centre[i] + h * n]);
+    }
+    for (int i = 0; i < 4; i++) {
+        if (!chosen[i]) continue;
         field_node around[9];
-        for (int j = 0; j < 9; j++) around[j] = halves[1 + v + j / 3][1 + u + j % 3];
-        choose_around(c, centre[i], h, rank - 2, around, code);
+        field_around_quarter(c->field, nine, i, around);
+        choose_around(c, centre[i], h, rank - 2, around, code[i]);
     }
 }
 
 uint8_t rule_choose(const rqt_rule *rule, const rqt_block_place *place, const rqt_block *block, uint8_t mask,
                     uint8_t *chosen) {
     const uint32_t n = (UINT32_C(1) << block->k) + 1, half = n / 2, middle = half * n + half;
-    choosing c = {rule, rule_field(rule), block->error, block->flags, chosen, n, mask, 0xFF};
+    choosing c = {rule, rule_field(rule), block, chosen, n, mask, 0xFF};
     memset(chosen, 0, (size_t)n * n);
     if (block->k == 0) return c.all;
     field_node nine[9];
