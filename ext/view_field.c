@@ -136,9 +136,9 @@ static int find_relief(builder *b, rqt_square square, int level) {
     const store_terrain *t = b->terrain;
     rqt_block_place place;
     b->relief[level] = level == 0 ? store_relief_of_all(t) : b->relief[level - 1];
+    if (level > t->lattice.K - t->k) return SQLITE_OK;
     const rqt_block_number number = rqt_block_number_of(level, square.x / square.side, square.y / square.side);
-    if (level > t->lattice.K - t->k || rqt_block_locate(&t->lattice, t->k, number, &place) != RQT_OK)
-        return SQLITE_OK;
+    if (rqt_block_locate(&t->lattice, t->k, number, &place) != RQT_OK) return SQLITE_OK;
     return store_find_relief(b->store, t, number, &b->relief[level], b->error);
 }
 
@@ -159,8 +159,7 @@ static rqt_field_step decide(void *context, rqt_square square, double *eps) {
     if (++b->asked % ASKED_AT_A_TIME == 0 && store_is_interrupted(b->store, &b->code)) return RQT_FIELD_FAIL;
     const view *v = b->view;
     const rqt_lattice *lattice = &b->terrain->lattice;
-    int level = lattice->K;
-    while (square.side >> (lattice->K - level) > 1) level--;
+    const int level = lattice->K - __builtin_ctz((unsigned)square.side);
     b->code = find_relief(b, square, level);
     if (b->code != SQLITE_OK) return RQT_FIELD_FAIL;
     const store_relief *relief = &b->relief[level];

@@ -65,6 +65,27 @@ static inline column_codes codes_of_column(const rqt_code column[6]) {
     lesser(lesser((c)[first].of, (c)[(first) + 1].of), lesser((c)[(first) + 2].of, (c)[(first) + 3].of))
 #define LEAST3(c, first, of) lesser(lesser((c)[first].of, (c)[(first) + 1].of), (c)[(first) + 2].of)
 
+/* Of what is around a cell's centre. */
+typedef struct child_codes {
+    rqt_code side[4], quarter[4]; /* north, west, east, south; north-west, north-east, south-west, south-east */
+} child_codes;
+
+static child_codes codes_of_children(const rqt_field *field, const field_node nine[9]) {
+    rqt_code halves[6][6]; /* column by column */
+    field_halve(field, nine, halves);
+    column_codes of[6];
+    for (int u = 0; u < 6; u++) of[u] = codes_of_column(halves[u]);
+    return (child_codes){{LEAST4(of, 1, north), LEAST4(of, 0, across), LEAST4(of, 2, across), LEAST4(of, 1, south)},
+                         {LEAST3(of, 1, quarter[0]), LEAST3(of, 2, quarter[0]), LEAST3(of, 1, quarter[1]),
+                          LEAST3(of, 2, quarter[1])}};
+}
+
+static inline bool are_one_square(const field_node nine[9]) {
+    bool same = true;
+    for (int j = 1; j < 9; j++) same &= nine[j] == nine[0];
+    return same;
+}
+
 /* middle: the place of a cell's centre, of that rank, which is chosen; half: places from it to the sides. */
 static void choose_around(choosing *c, uint32_t middle, uint32_t half, int rank, const field_node nine[9],
                           rqt_code least) {
@@ -78,31 +99,25 @@ static void choose_around(choosing *c, uint32_t middle, uint32_t half, int rank,
     if (!may) return;
     for (int i = 0; i < 4; i++) __builtin_prefetch(&c->block->error[centre[i]]);
 
-    rqt_code codes[6][6]; /* column by column */
-    field_halve(c->field, nine, codes);
-    column_codes of[6];
-    for (int u = 0; u < 6; u++) of[u] = codes_of_column(codes[u]);
-    choose_place(c, side[0], LEAST4(of, 1, north), rank - 1);
-    choose_place(c, side[1], LEAST4(of, 0, across), rank - 1);
-    choose_place(c, side[2], LEAST4(of, 2, across), rank - 1);
-    choose_place(c, side[3], LEAST4(of, 1, south), rank - 1);
-    if (half == 1) return;
-    rqt_code code[4];
+    const bool is_one = are_one_square(nine);
+    const child_codes codes = is_one ? (child_codes){{least, least, least, least}, {least, least, least, least}}
+                                     : codes_of_children(c->field, nine);
     bool chosen[4];
+    for (int i = 0; i < 4; i++) chosen[i] = choose_place(c, side[i], codes.side[i], rank - 1);
+    if (half == 1) return;
+    bool goes_on[4];
     for (int i = 0; i < 4; i++) {
-        const int u = i & 1, v = i >> 1;
-        code[i] = LEAST3(of, 1 + u, quarter[v]);
-        chosen[i] = c->chosen[side[v ? 3 : 0]] && c->chosen[side[u ? 2 : 1]] &&
-                    choose_place(c, centre[i], code[i], rank - 2);
-        if (!chosen[i]) continue;
+        goes_on[i] = chosen[i & 2 ? 3 : 0] && chosen[i & 1 ? 2 : 1] &&
+                     choose_place(c, centre[i], codes.quarter[i], rank - 2);
+        if (!goes_on[i]) continue;
         __builtin_prefetch(&c->block->error[centre[i] - h * n]);
         __builtin_prefetch(&c->block->error[centre[i] + h * n]);
     }
     for (int i = 0; i < 4; i++) {
-        if (!chosen[i]) continue;
+        if (!goes_on[i]) continue;
         field_node around[9];
-        field_around_quarter(c->field, nine, i, around);
-        choose_around(c, centre[i], h, rank - 2, around, code[i]);
+        if (!is_one) field_around_quarter(c->field, nine, i, around);
+        choose_around(c, centre[i], h, rank - 2, is_one ? nine : around, codes.quarter[i]);
     }
 }
 
