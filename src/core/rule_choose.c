@@ -97,7 +97,11 @@ static void choose_around(choosing *c, uint32_t middle, uint32_t half, int rank,
     for (int i = 0; i < 4; i++) may |= may_be_selected(c, side[i], threshold);
     /* A quarter's centre depends on the middles of two sides. */
     if (!may) return;
-    for (int i = 0; i < 4; i++) __builtin_prefetch(&c->block->error[centre[i]]);
+    for (int i = 0; i < 4; i++) {
+        __builtin_prefetch(&c->block->error[centre[i]]);
+        __builtin_prefetch(&c->block->flags[centre[i]]);
+        __builtin_prefetch(&c->block->flags[side[i]]);
+    }
 
     const bool is_one = are_one_square(nine);
     const child_codes codes = is_one ? (child_codes){{least, least, least, least}, {least, least, least, least}}
