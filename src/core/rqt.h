@@ -90,6 +90,9 @@ int rqt_vertex_rank(const rqt_lattice *lattice, rqt_vertex v);
 /* The vertices that v depends on, at most two; returns their number: 0 for corners, 1 for a midpoint of the
  * root's border, 2 otherwise. */
 int rqt_vertex_parents(const rqt_lattice *lattice, rqt_vertex v, rqt_vertex parents[2]);
+/* The ends of the edge that v halves, which have higher scales than v; returns their number: 0 for corners, else 2.
+ */
+int rqt_vertex_ends(const rqt_lattice *lattice, rqt_vertex v, rqt_vertex ends[2]);
 /* The vertices that depend on v, at most four; returns their number. */
 int rqt_vertex_children(const rqt_lattice *lattice, rqt_vertex v, rqt_vertex children[4]);
 /* The sample that a lattice vertex stands for. */
@@ -925,6 +928,22 @@ rqt_status rqt_wire_normals(const uint8_t *bytes, size_t size, size_t vertex_cou
                             float *normals, rqt_message *message);
 /* What an increment knows a mesh by: its vertices, their levels and heights, and its leaves, in their order. */
 uint64_t rqt_wire_digest(const rqt_patch *patch);
+
+/* ------------------------------------------------------------------------------------------ geomorphs --
+ * From one mesh of a terrain to another without a jump: over the mesh of the union of their vertices (the mesh of
+ * the field with the lesser eps at each place), each vertex moves from its height on the one to that on the other.
+ * At the time t, 0 .. 1, each sample is within (1-t) times what the one mesh allows and t times what the other
+ * does, wherever both have a mesh; at the ends it is the one and the other, exactly, except near the raster's last
+ * column and row where these are not the lattice's: there vertices do not move. See morph.c. */
+#define RQT_NO_VERTEX UINT32_MAX
+
+/* The heights, in quanta, of the vertices of a patch on the mesh `from` (with leaves), a patch of the same terrain:
+ * exact, and NaN where `from` has no mesh. (NaN too where one depends on a vertex near the raster's end that is in
+ * neither patch, which happens at the patch's rim.) ends, unless NULL: two per vertex, the indices of the ends of
+ * the edge that it halves, RQT_NO_VERTEX for one that is not in the patch and for vertices near the raster's end.
+ * RQT_INVALID when `from` has no leaves. */
+rqt_status rqt_morph_heights(const rqt_lattice *lattice, const rqt_patch *from, const rqt_patch *patch,
+                             const rqt_allocator *allocator, double *heights, uint32_t *ends);
 
 #ifdef __cplusplus
 }

@@ -61,6 +61,23 @@ typedef struct rqt_view_bound {
  * have a depth > 0) are at most tau apart. eps is infinite where none of both can be drawn. */
 void rqt_view_tolerance(const rqt_camera *camera, const rqt_prism *prism, rqt_view_bound *bound);
 
+/* -------------------------------------------------------------------------------------------------- bands --
+ * A view that is also right for cameras near the one it was made for: view_band.c has the proof. */
+typedef struct rqt_view_band {
+    double move; /* how far the eye may go, metres of the scene */
+    double turn; /* how far the camera may turn, around any axis: 2 sin(half the angle) */
+} rqt_view_band;
+
+/* A band that costs about an eighth of the tolerance at most: nearest is how far what is nearest of the terrain is
+ * from the eye, about (wrong, the band is still right, but too dear or too narrow). move and turn are > 0. */
+rqt_view_band rqt_camera_band(const rqt_camera *camera, double nearest);
+/* Is a camera within the band of another? One lens, tau and range of depths are needed: all that is not eye and
+ * directions must be equal. */
+bool rqt_camera_holds(const rqt_camera *anchor, const rqt_view_band *band, const rqt_camera *camera);
+/* The piece is grown so that what any test of a camera's tolerance allows it, for the anchor, is allowed to the
+ * piece as it was for every camera of the band; and if it is not shown, nor was that to any of them. */
+void rqt_prism_grow(const rqt_camera *anchor, const rqt_view_band *band, rqt_prism *prism);
+
 /* ---------------------------------------------------------------------------------------------- other tests --
  * Tests of the literature, by name, for comparing: they guarantee nothing on the screen. Each says how large the
  * error of its own metric may be in a piece; METHODS.md has definitions, sources and what had to be mended. */
