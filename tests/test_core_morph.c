@@ -353,7 +353,7 @@ static void F35_a_geomorph_begins_on_one_mesh_ends_on_the_other_and_stays_within
     random_begin("geomorphs of lattices");
     tally sum = {0};
     run(150, true, false, false, &sum);
-    CHECK(sum.moved > 1000 && sum.places > 10000 && sum.ends == 0 && sum.apart == 0, "%ld %ld %ld %ld", sum.moved,
+    CHECK(sum.moved > 500 && sum.places > 10000 && sum.ends == 0 && sum.apart == 0, "%ld %ld %ld %ld", sum.moved,
           sum.places, sum.ends, sum.apart);
 }
 
@@ -362,7 +362,7 @@ static void F35_where_the_raster_ends_within_the_lattice_the_tolerances_hold(voi
     random_begin("geomorphs of rasters");
     tally sum = {0};
     run(250, false, false, false, &sum);
-    CHECK(sum.moved > 100 && sum.ends > 1000 && sum.places > 5 * sum.ends && sum.apart == 0, "%ld %ld %ld %ld",
+    CHECK(sum.moved > 100 && sum.ends > 1000 && sum.places > 2 * sum.ends && sum.apart == 0, "%ld %ld %ld %ld",
           sum.moved, sum.places, sum.ends, sum.apart);
 }
 

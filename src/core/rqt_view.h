@@ -77,8 +77,9 @@ typedef struct rqt_view_band {
     double turn; /* how far the camera may turn, around any axis: 2 sin(half the angle) */
 } rqt_view_band;
 
-/* A band that costs about an eighth of the tolerance at most: nearest is how far what is nearest of the terrain is
- * from the eye, about (wrong, the band is still right, but too dear or too narrow). move and turn are > 0. */
+/* A band that costs about an eighth of the tolerance (where pieces are seen slantwise 0.18): nearest is how far
+ * what is nearest of the terrain is from the eye, about (wrong, the band is still right, but too dear or too
+ * narrow). move and turn are > 0. */
 rqt_view_band rqt_camera_band(const rqt_camera *camera, double nearest);
 /* Is a camera within the band of another? One lens, tau and range of depths are needed: all that is not eye and
  * directions must be equal. */

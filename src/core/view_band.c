@@ -9,17 +9,18 @@
  * Let the eyes be at most `move` apart and the rotation's angle be a, turn = 2 sin(a/2). A rotation by a moves a
  * point at a distance r from its centre by at most r * turn: so g moves a point at a distance r from A's eye by at
  * most move + (r + move) * turn. So g takes the samples of a piece into the piece grown by that much, r the
- * distance of its furthest point, and turns directions by at most a. What the tolerance allows the piece that was
- * grown, for A (rqt_view_tolerance), it allows the piece itself, for every such B; where the former is not shown,
- * nor is the latter. That is all: nothing here knows how tolerances come about.
+ * distance of its furthest point. What the tolerance allows the piece that was grown, for A (rqt_view_tolerance),
+ * it allows the piece itself, for every such B; where the former is not shown, nor is the latter. That is all:
+ * nothing here knows how tolerances come about.
  *
  * The rotation takes forward, right, up to others; the sum of the squares of how far the three ends move is
  * 8 sin^2(a/2), the squared norm of the matrix R - 1. So 2 sin(a/2) comes without an arc cosine, which loses all
  * that is small.
  *
  * How large a band? A piece at a distance d loses about the share (move + d * turn) / d of its eps. With move = s *
- * (the nearest that is shown) and turn = s that is at most 2s: an eighth, for s = 1/16. What is shown grows by s
- * seen from the eye, on each side, twice: for long lenses s is less. */
+ * (the nearest that is shown) and turn = s that is at most 2s: an eighth, for s = 1/16 (1.4 times as much where a
+ * piece is seen slantwise: it grows sideways and upward). What is shown grows by s seen from the eye, on each side,
+ * twice: for long lenses s is less. */
 #include "internal.h"
 
 #include <math.h>
@@ -63,5 +64,4 @@ void rqt_prism_grow(const rqt_camera *anchor, const rqt_view_band *band, rqt_pri
         band->move + band->turn * furthest + ROUNDING * (furthest + size_of(prism->centre) + size_of(anchor->eye));
     prism->radius += most;
     prism->half_height += most;
-    prism->tilt = fmin(prism->tilt + 2 * asin(fmin(band->turn / 2, 1)) * (1 + ROUNDING) + ROUNDING, M_PI);
 }
