@@ -945,6 +945,48 @@ uint64_t rqt_wire_digest(const rqt_patch *patch);
 rqt_status rqt_morph_heights(const rqt_lattice *lattice, const rqt_patch *from, const rqt_patch *patch,
                              const rqt_allocator *allocator, double *heights, uint32_t *ends);
 
+/* --------------------------------------------------------------------------------------- increments --
+ * What turns one mesh into another, for views that follow a camera (FORMAT.md, "View increment"): vertices and
+ * triangles that go, and those that come. Both ends number a mesh in one way, so that neither has to know how the
+ * other came by it: rqt_patch_sort. Of vertices only col, row and q count. */
+#define RQT_INCREMENT_HEADER_BYTES 48
+
+typedef struct rqt_increment_header {
+    uint64_t from, to;                     /* rqt_increment_digest of the meshes that it begins from and ends in */
+    uint64_t vertex_count, triangle_count; /* of the mesh that it ends in */
+    bool is_unchanged;
+    const void *note; /* bytes of the sender's own, which travel along */
+    size_t note_size; /* below 2^31 */
+    /* What makes places and metres of a mesh: told with an increment from nothing. */
+    bool has_frame;
+    rqt_placement placement;
+    rqt_unit unit;
+    double eps;
+    int32_t srid;
+} rqt_increment_header;
+
+/* Vertices along the Morton curve (column in the even bits), triangles by the numbers of their vertices, first to
+ * third; leaves go with their triangles; there is no strip. Samples are told apart by col and row. RQT_NO_MEMORY:
+ * the patch is freed. */
+rqt_status rqt_patch_sort(rqt_patch *patch);
+/* What an increment knows a sorted mesh by: col, row and q of its vertices, its triangles. */
+uint64_t rqt_increment_digest(const rqt_patch *sorted);
+/* The most bytes that rqt_increment_encode can write. old NULL: from nothing. */
+size_t rqt_increment_bound(const rqt_patch *old, const rqt_patch *fresh, size_t note_size);
+/* Both sorted. Of the header note, placement, unit, eps and srid are read. Equal meshes give equal bytes. */
+rqt_status rqt_increment_encode(const rqt_increment_header *header, const rqt_patch *old, const rqt_patch *fresh,
+                                const rqt_allocator *allocator, uint8_t *bytes, size_t *size);
+/* Header only; the checksum of all bytes is compared. header->note points into bytes. */
+rqt_status rqt_increment_info(const uint8_t *bytes, size_t size, rqt_increment_header *header,
+                              rqt_message *message);
+/* The mesh that an increment makes of `old` (sorted; NULL: nothing), sorted: the sender's vertices and triangles,
+ * with errors and levels 0. Trusts nothing: any input gives RQT_OK, RQT_CORRUPT, RQT_INVALID for an increment from
+ * another mesh, or RQT_NO_MEMORY; the memory taken is bounded by old and by the size of the payload, at most 2^15
+ * times that of the bytes. */
+rqt_status rqt_increment_apply(const rqt_patch *old, const uint8_t *bytes, size_t size,
+                               const rqt_allocator *allocator, rqt_increment_header *header, rqt_patch *mesh,
+                               rqt_message *message);
+
 #ifdef __cplusplus
 }
 #endif
