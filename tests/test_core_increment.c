@@ -479,8 +479,7 @@ static void refused_memory_is_said_and_nothing_is_kept(void **state) {
         if (status == RQT_OK) {
             size_t small;
             uint8_t same[200];
-            status = rqt_increment_encode(&(rqt_increment_header){.note_size = 0}, &a, &a, &test_allocator, bytes,
-                                          &small);
+            status = rqt_increment_encode(&header, &a, &a, &test_allocator, bytes, &small);
             if (status == RQT_OK) {
                 memcpy(same, bytes, small);
                 status = rqt_increment_apply(&a, same, small, &test_allocator, &told, &again, NULL);
