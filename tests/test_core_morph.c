@@ -201,19 +201,19 @@ static void check_place(const scene *s, size_t t, spot at, tally *sum) {
         end += (__int128)weight[c] * binary(s->to.height[v], l->K);
     }
     sum->places++;
-    if (start * a_den != (a_num * area) << l->K) {
+    if (start * a_den != (a_num * area) * (1L << l->K)) {
         CHECK(jumps(s, &s->from.patch, at), "at (%g,%g) it does not begin on A", (double)at.x / 3,
               (double)at.y / 3);
         sum->ends++;
     }
-    if (end * b_den != (b_num * area) << l->K) {
+    if (end * b_den != (b_num * area) * (1L << l->K)) {
         CHECK(jumps(s, &s->to.patch, at), "at (%g,%g) it does not end on B", (double)at.x / 3, (double)at.y / 3);
         sum->ends++;
     }
     if (at.x % 3 || at.y % 3) return;
     const int x = (int)at.x / 3, y = (int)at.y / 3, n = y * l->width + x;
     if (s->m.r.valid && !s->m.r.valid[n]) return;
-    const __int128 z = ((__int128)s->m.r.q[n] * area) << l->K;
+    const __int128 z = (__int128)s->m.r.q[n] * area * (1L << l->K);
     for (int step = 0; step <= STEPS; step++) {
         const __int128 off = (STEPS - step) * (start - z) + step * (end - z);
         const __int128 allowed =
