@@ -17,6 +17,7 @@ typedef struct mesh {
     bool is_view;
     double achieved_tau; /* of a view */
     bool guaranteed;
+    char *token; /* NULL: none */
     double *xyz; /* of each vertex, in a frame of its own; NULL: the terrain's CRS */
 } mesh;
 
@@ -24,6 +25,7 @@ static void release(void *data) {
     mesh *m = data;
     store_keep(m->store, &m->patch);
     sqlite3_free(m->xyz);
+    sqlite3_free(m->token);
     rqt_cut_free(&m->cut);
     sqlite3_free(m);
 }
@@ -94,6 +96,7 @@ static int make_mesh(connection *c, bool is_view, sqlite3_value **arguments, rqt
         m->achieved_eps = r.achieved_eps;
         m->is_view = is_view;
         if (is_view) m->achieved_tau = r.view->achieved_tau, m->guaranteed = r.view->guaranteed;
+        if (code == SQLITE_OK && is_view) code = view_token_of(&r, &m->patch, &m->token, error);
         if (code == SQLITE_OK && r.frame) {
             code = frame_merge(r.frame, &m->patch);
             if (code == SQLITE_OK) code = frame_places(r.frame, &m->patch, &m->xyz, error);
@@ -111,13 +114,15 @@ static int make_mesh(connection *c, bool is_view, sqlite3_value **arguments, rqt
     return SQLITE_OK;
 }
 
-/* What is told of the whole mesh, in every row: achieved_eps; of a view achieved_tau and guaranteed. */
+/* What is told of the whole mesh, in every row: achieved_eps; of a view achieved_tau, guaranteed and token. */
 static int told_columns(const mesh *m) {
-    return m->is_view ? 2 : 1;
+    return m->is_view ? 3 : 1;
 }
 
 static void put_told(const mesh *m, int which, sqlite3_context *result) {
-    if (which == 1)
+    if (which == 2)
+        sqlite3_result_text(result, m->token, -1, SQLITE_TRANSIENT);
+    else if (which == 1)
         sqlite3_result_int(result, m->guaranteed);
     else
         sqlite3_result_double(result, m->is_view ? m->achieved_tau : m->achieved_eps);

@@ -233,13 +233,14 @@ rqt_status rqt_increment_encode(const rqt_increment_header *header, const rqt_pa
     if (!old) old = &nothing;
     const size_t bound = rqt_increment_bound(old, fresh, header->note_size);
     if (bound > UINT32_MAX) return RQT_INVALID; /* so that counts and sizes take 32 bits */
-    const bool has_frame = old->vertex_count == 0;
+    const bool has_frame = old->vertex_count == 0 && old != fresh;
     memset(bytes, 0, RQT_INCREMENT_HEADER_BYTES);
     memcpy(bytes, "RQTI", 4);
     bytes[AT_VERSION] = RQT_FORMAT_VERSION;
     bytes[AT_FLAGS] = has_frame ? FLAG_FRAME : 0;
-    put64(bytes + AT_FROM, rqt_increment_digest(old));
-    put64(bytes + AT_TO, rqt_increment_digest(fresh));
+    const uint64_t from = rqt_increment_digest(old);
+    put64(bytes + AT_FROM, from);
+    put64(bytes + AT_TO, old == fresh ? from : rqt_increment_digest(fresh));
     put32(bytes + AT_VERTEX_COUNT, (uint32_t)fresh->vertex_count);
     put32(bytes + AT_TRIANGLE_COUNT, (uint32_t)fresh->triangle_count);
     put32(bytes + AT_NOTE, (uint32_t)header->note_size);
@@ -250,6 +251,11 @@ rqt_status rqt_increment_encode(const rqt_increment_header *header, const rqt_pa
     }
     if (header->note_size) memcpy(p, header->note, header->note_size);
     p += header->note_size;
+    if (old == fresh) {
+        *size = (size_t)(p - bytes);
+        put64(bytes + AT_CHECKSUM, checksum64(bytes, *size, AT_CHECKSUM));
+        return RQT_OK;
+    }
 
     rqt_allocator copy = *allocator;
     const ZSTD_customMem memory = {wire_take, wire_drop, &copy};

@@ -979,7 +979,9 @@ rqt_status rqt_patch_sort(rqt_patch *patch);
 uint64_t rqt_increment_digest(const rqt_patch *sorted);
 /* The most bytes that rqt_increment_encode can write. old NULL: from nothing. */
 size_t rqt_increment_bound(const rqt_patch *old, const rqt_patch *fresh, size_t note_size);
-/* Both sorted. Of the header note, placement, unit, eps and srid are read. Equal meshes give equal bytes. */
+/* Both sorted. Of the header note, placement, unit, eps and srid are read. Equal meshes give equal bytes. old ==
+ * fresh: that nothing changes, in RQT_INCREMENT_HEADER_BYTES and the note; without a frame. RQT_INVALID for more
+ * than 2^32 bytes. */
 rqt_status rqt_increment_encode(const rqt_increment_header *header, const rqt_patch *old, const rqt_patch *fresh,
                                 const rqt_allocator *allocator, uint8_t *bytes, size_t *size);
 /* Header only; the checksum of all bytes is compared. header->note points into bytes. */
