@@ -156,15 +156,15 @@ static rqt_field_step decide(void *context, rqt_square square, double *eps) {
     if (find_piece(b, square, &level, &piece) != SQLITE_OK) return RQT_FIELD_FAIL;
     rqt_view_test_bound(v->test, &v->camera, &piece, &bound);
     if (square.side > 1 && worth_of(b, square, level, &bound) > WORTH_CUTTING) return RQT_FIELD_SPLIT;
-    if (v->has_band) {
-        rqt_prism_grow(&v->camera, &v->band, &piece.prism);
-        rqt_view_test_bound(v->test, &v->camera, &piece, &bound);
-    }
+    if (v->has_band) rqt_view_tolerance_in_band(&v->camera, &v->band, &piece.prism, &bound);
     const bool shown = bound.shown;
     if (shown && v->achieved_tau != v->camera.tau) {
         rqt_camera coarse = v->camera;
         coarse.tau = v->achieved_tau;
-        rqt_view_test_bound(v->test, &coarse, &piece, &bound);
+        if (v->has_band)
+            rqt_view_tolerance_in_band(&coarse, &v->band, &piece.prism, &bound);
+        else
+            rqt_view_test_bound(v->test, &coarse, &piece, &bound);
     }
     *eps = bound.eps / v->scene.exaggeration;
     if (!shown || add_square(&b->shown, square)) return RQT_FIELD_LEAF;

@@ -81,16 +81,16 @@ typedef struct rqt_view_band {
     double turn; /* how far the camera may turn, around any axis: 2 sin(half the angle) */
 } rqt_view_band;
 
-/* A band that costs about an eighth of the tolerance (where pieces are seen slantwise 0.18): nearest is how far
- * what is nearest of the terrain is from the eye, about (wrong, the band is still right, but too dear or too
- * narrow). move and turn are > 0. */
+/* A band that costs about a sixteenth of the tolerance (where pieces are seen slantwise a tenth), and some ground
+ * beside what the camera sees: nearest is how far what is nearest of the terrain is from the eye, about (wrong, the
+ * band is still right, but too dear or too narrow). move and turn are > 0. */
 rqt_view_band rqt_camera_band(const rqt_camera *camera, double nearest);
 /* Is a camera within the band of another? One lens, tau and range of depths are needed: all that is not eye and
  * directions must be equal. */
 bool rqt_camera_holds(const rqt_camera *anchor, const rqt_view_band *band, const rqt_camera *camera);
-/* The piece is grown so that what any test of a camera's tolerance allows it, for the anchor, is allowed to the
- * piece as it was for every camera of the band; and if it is not shown, nor was that to any of them. */
-void rqt_prism_grow(const rqt_camera *anchor, const rqt_view_band *band, rqt_prism *prism);
+/* rqt_view_tolerance that holds for every camera of the band. */
+void rqt_view_tolerance_in_band(const rqt_camera *anchor, const rqt_view_band *band, const rqt_prism *prism,
+                                rqt_view_bound *bound);
 
 /* ---------------------------------------------------------------------------------------------- other tests --
  * Tests of the literature, by name, for comparing: they guarantee nothing on the screen. Each says how large the

@@ -1,27 +1,30 @@
 /* view_band.c - how far a camera may go before its view has to be made anew.
  *
- * Let A and B be cameras with one lens (all but eye and directions equal). The rotation that takes A's directions
- * to B's, around A's eye, and the shift of A's eye to B's make one rigid motion that takes A to B; call its inverse
- * g. B sees a point p where A sees g(p): depths, places in the picture and distances from the eye are the same. So
- * a mesh is within the tolerance for B iff what g makes of mesh and samples is for A, and g keeps distances: |S -
- * M| <= eps is |g(S) - g(M)| <= eps.
+ * Let A and B be cameras with one lens (all but eye and directions equal), the eyes at most `move` apart; the
+ * rotation that takes A's directions to B's turns by an angle a, turn = 2 sin(a/2).
  *
- * Let the eyes be at most `move` apart and the rotation's angle be a, turn = 2 sin(a/2). A rotation by a moves a
- * point at a distance r from its centre by at most r * turn: so g moves a point at a distance r from A's eye by at
- * most move + (r + move) * turn. So g takes the samples of a piece into the piece grown by that much, r the
- * distance of its furthest point. What the tolerance allows the piece that was grown, for A (rqt_view_tolerance),
- * it allows the piece itself, for every such B; where the former is not shown, nor is the latter. That is all:
- * nothing here knows how tolerances come about.
+ * Moved. Let C be at B's eye and look as A does. C sees a point p where A sees p - d, d the shift from eye to eye:
+ * so it sees a piece as A sees one that is somewhere in the piece grown by `move`. Distances from the eye and
+ * angles between rays and the terrain's verticals are the same for both.
+ *
+ * Turned. B is C, turned around its own eye: for those distances and angles that changes nothing. B sees p where C
+ * sees what the rotation back makes of p, which is at most r * turn away, r the distance of p from the eye, no more
+ * than move + the distance from A's eye. So B sees a piece as A sees one in the piece grown by move + turn * (move
+ * + the distance of its furthest point): depths, places in the picture and what the frustum misses are the same.
+ *
+ * The tolerance (view.c) takes distances and angles to verticals for themselves, and the picture for itself: so it
+ * asks the piece grown by `move` for the former, and the piece grown by all for the latter. What comes out holds
+ * for every such B. When nothing of the piece grown by all is shown, B shows nothing of the piece.
  *
  * The rotation takes forward, right, up to others; the sum of the squares of how far the three ends move is
  * 8 sin^2(a/2), the squared norm of the matrix R - 1. So 2 sin(a/2) comes without an arc cosine, which loses all
  * that is small.
  *
- * How large a band? A piece at a distance d loses about the share (move + d * turn) / d of its eps. With move = s *
- * (the nearest that is shown) and turn = s that is at most 2s: an eighth, for s = 1/16 (1.4 times as much where a
- * piece is seen slantwise: it grows sideways and upward). What is shown grows by s seen from the eye, on each side,
- * twice: for long lenses s is less. */
-#include "internal.h"
+ * How large a band? A piece at a distance d loses about the share move / d of its eps: with move = s * (the nearest
+ * that is shown) no more than s, 1.4 times as much where it is seen slantwise and grows sideways and upward. What
+ * is shown grows by turn = s, and by move seen from the eye, on each side. For long lenses s is less than the usual
+ * 1/16. */
+#include "view.h"
 
 #include <math.h>
 
@@ -57,11 +60,19 @@ bool rqt_camera_holds(const rqt_camera *anchor, const rqt_view_band *band, const
     return distance_of(camera->eye, anchor->eye) <= band->move && sqrt((f * f + r * r + u * u) / 2) <= band->turn;
 }
 
-void rqt_prism_grow(const rqt_camera *anchor, const rqt_view_band *band, rqt_prism *prism) {
+static rqt_prism grown(const rqt_prism *prism, double by) {
+    rqt_prism p = *prism;
+    p.radius += by;
+    p.half_height += by;
+    return p;
+}
+
+void rqt_view_tolerance_in_band(const rqt_camera *anchor, const rqt_view_band *band, const rqt_prism *prism,
+                                rqt_view_bound *bound) {
     const double furthest =
         distance_of(prism->centre, anchor->eye) + hypot(prism->radius, prism->half_height) + band->move;
-    const double most =
-        band->move + band->turn * furthest + ROUNDING * (furthest + size_of(prism->centre) + size_of(anchor->eye));
-    prism->radius += most;
-    prism->half_height += most;
+    const double rounding = ROUNDING * (furthest + size_of(prism->centre) + size_of(anchor->eye));
+    const rqt_prism place = grown(prism, band->move + rounding),
+                    picture = grown(prism, band->move + band->turn * furthest + rounding);
+    view_tolerance(anchor, &place, &picture, bound);
 }
