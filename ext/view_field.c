@@ -29,8 +29,9 @@ typedef struct builder {
     const store_terrain *terrain;
     store_relief relief[RQT_MAX_K + 1]; /* of the square at hand and of those around it, by level */
     square_list shown;
-    uint32_t asked; /* squares */
-    double nearest; /* so far */
+    uint32_t asked;     /* squares */
+    rqt_camera cutting; /* the camera that says which squares are cut */
+    double nearest;     /* so far */
     int code;
     char **error;
 } builder;
@@ -145,8 +146,9 @@ static int find_piece(builder *b, rqt_square square, int *level, rqt_view_piece 
     return SQLITE_OK;
 }
 
-/* Squares are those of the camera alone, whatever its band, and how much more tau is allowed: so with more of it no
- * square gets less, and what is not shown stays so. */
+/* How squares are cut does not depend on achieved_tau: so with more of it no square gets less, and what is not
+ * shown stays so. In a band it goes by a camera that sees what all of them see: the piece's share of what it could
+ * have tells nothing there, for no part of it could have that. */
 static rqt_field_step decide(void *context, rqt_square square, double *eps) {
     builder *b = context;
     const view *v = b->view;
@@ -154,7 +156,7 @@ static rqt_field_step decide(void *context, rqt_square square, double *eps) {
     rqt_view_bound bound;
     int level = 0;
     if (find_piece(b, square, &level, &piece) != SQLITE_OK) return RQT_FIELD_FAIL;
-    rqt_view_test_bound(v->test, &v->camera, &piece, &bound);
+    rqt_view_test_bound(v->test, &b->cutting, &piece, &bound);
     if (square.side > 1 && worth_of(b, square, level, &bound) > WORTH_CUTTING) return RQT_FIELD_SPLIT;
     if (v->has_band) rqt_view_tolerance_in_band(&v->camera, &v->band, &piece.prism, &bound);
     const bool shown = bound.shown;
@@ -180,6 +182,7 @@ static int ended(const builder *b, rqt_status status, char **error) {
 int view_field(request *r, char **error) {
     view *v = r->view;
     builder b = {.view = v, .store = r->store, .terrain = r->terrain, .error = error};
+    b.cutting = v->has_band ? rqt_camera_widen(&v->camera, &v->band) : v->camera;
     rqt_field_free(v->field);
     const rqt_status status = rqt_field_create(&r->terrain->lattice, store_allocator(), decide, &b, &v->field);
     int code = ended(&b, status, error);

@@ -88,6 +88,8 @@ rqt_view_band rqt_camera_band(const rqt_camera *camera, double nearest);
 /* Is a camera within the band of another? One lens, tau and range of depths are needed: all that is not eye and
  * directions must be equal. */
 bool rqt_camera_holds(const rqt_camera *anchor, const rqt_view_band *band, const rqt_camera *camera);
+/* A camera that sees about what those of the band see together: where to look more closely. */
+rqt_camera rqt_camera_widen(const rqt_camera *anchor, const rqt_view_band *band);
 /* rqt_view_tolerance that holds for every camera of the band. */
 void rqt_view_tolerance_in_band(const rqt_camera *anchor, const rqt_view_band *band, const rqt_prism *prism,
                                 rqt_view_bound *bound);

@@ -76,3 +76,19 @@ void rqt_view_tolerance_in_band(const rqt_camera *anchor, const rqt_view_band *b
                     picture = grown(prism, band->move + band->turn * furthest + rounding);
     view_tolerance(anchor, &place, &picture, bound);
 }
+
+/* The pyramid of the picture, each side turned outward by the turn and shifted outward by the move, which is the
+ * pyramid of an eye further back. Nothing is proved by it. */
+rqt_camera rqt_camera_widen(const rqt_camera *anchor, const rqt_view_band *band) {
+    rqt_camera wide = *anchor;
+    const double turn = 2 * asin(fmin(band->turn / 2, 1)), most = M_PI / 2 * 0.999;
+    const double across = fmin(atan(anchor->width / (2 * anchor->focal)) + turn, most),
+                 upward = fmin(atan(anchor->height / (2 * anchor->focal)) + turn, most);
+    const double back = band->move / sin(fmin(across, upward));
+    wide.width = 2 * anchor->focal * tan(across);
+    wide.height = 2 * anchor->focal * tan(upward);
+    for (int c = 0; c < 3; c++) wide.eye[c] -= back * anchor->forward[c];
+    wide.near = fmax(anchor->near - back, 0);
+    wide.far = anchor->far + 2 * back;
+    return wide;
+}
