@@ -27,8 +27,6 @@ MUTANTS = [
      SQL, "helens 2: what is drawn is within tau"),
     ("scene: a rule without its field", "ext/detail.c", "if (status == RQT_OK && r->view) status = rqt_rule_set_field(r->options.rule, r->view->field);", "",
      SQL, "what is drawn is within tau"),
-    ("scene: brothers that are not of one square are one", "ext/view_field.c", "if (last[0].x % two != 0 || last[0].y % two != 0) break;", "",
-     SQL, ""),
     ("scene: what may be seen is left out of the region", "ext/view_field.c", "if (!bound.shown || add_square", "if (!bound.shown || square.side < 9 || add_square",
      SQL, "every sample that is drawn has its triangle"),
     ("scene: relief of the square before", "ext/view_field.c", "level == 0 ? store_relief_of_all(t) : b->relief[level - 1];",
