@@ -160,7 +160,7 @@ static rqt_field_step decide(void *context, rqt_square square, double *eps) {
     if (square.side > 1 && worth_of(b, square, level, &bound) > WORTH_CUTTING) return RQT_FIELD_SPLIT;
     if (v->has_band) rqt_view_tolerance_in_band(&v->camera, &v->band, &piece.prism, &bound);
     const bool shown = bound.shown;
-    if (shown && v->achieved_tau != v->camera.tau) {
+    if (v->achieved_tau != v->camera.tau) {
         rqt_camera coarse = v->camera;
         coarse.tau = v->achieved_tau;
         if (v->has_band)

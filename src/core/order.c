@@ -115,6 +115,7 @@ static bool take_order(rqt_patch *patch, const keyed *keys, const uint32_t *orde
 rqt_status rqt_patch_sort(rqt_patch *patch) {
     const rqt_allocator a = patch->allocator;
     const size_t vertices = patch->vertex_count, triangles = patch->triangle_count;
+    if (vertices == 0) return RQT_OK; /* nor is there an allocator, where nothing was asked for */
     keyed *keys = memory_take(&a, 2 * vertices * sizeof *keys);
     uint32_t *number = memory_take(&a, (vertices + 1) * sizeof *number),
              *order = memory_take(&a, triangles * sizeof *order);

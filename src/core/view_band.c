@@ -29,7 +29,7 @@
 #include <math.h>
 
 static const double LARGEST_SHARE = 1.0 / 16;
-static const double SHARE_OF_PICTURE = 1.0 / 8; /* of half the shorter side */
+static const double SHARE_OF_PICTURE = 1.0 / 16; /* of half the shorter side */
 /* Of all lengths and coordinates that are at hand: what doubles round away, of directions that are not quite unit
  * or not quite at right angles too. */
 static const double ROUNDING = 0x1p-44;
