@@ -16,6 +16,8 @@
  * ten thousand squares. */
 #define WORTH_CUTTING 1.0
 
+#define BAND_PRICE 1.2 /* what a band takes of the best anyway, and cutting does not give back */
+
 #define ASKED_AT_A_TIME 16384 /* squares between two questions whether to go on: a few milliseconds */
 
 typedef struct square_list {
@@ -157,8 +159,12 @@ static rqt_field_step decide(void *context, rqt_square square, double *eps) {
     int level = 0;
     if (find_piece(b, square, &level, &piece) != SQLITE_OK) return RQT_FIELD_FAIL;
     rqt_view_test_bound(v->test, &b->cutting, &piece, &bound);
+    if (v->has_band) {
+        const double best = bound.share > 0 ? bound.eps / bound.share : INFINITY;
+        rqt_view_tolerance_in_band(&v->camera, &v->band, &piece.prism, &bound);
+        bound.share = best > 0 ? fmin(bound.eps / best * BAND_PRICE, 1) : 1;
+    }
     if (square.side > 1 && worth_of(b, square, level, &bound) > WORTH_CUTTING) return RQT_FIELD_SPLIT;
-    if (v->has_band) rqt_view_tolerance_in_band(&v->camera, &v->band, &piece.prism, &bound);
     const bool shown = bound.shown;
     if (v->achieved_tau != v->camera.tau) {
         rqt_camera coarse = v->camera;
