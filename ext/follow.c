@@ -187,7 +187,7 @@ static int begin_anew(request *r, char **error) {
     return r->max_triangles > 0 ? view_keep_within(r, error) : request_select_view(r, error);
 }
 
-int view_settle(request *r, bool wants_increment, char **error) {
+int view_settle(request *r, view_wants wants, char **error) {
     view *v = r->view;
     const rqt_camera camera = v->camera;
     const double exaggeration = v->scene.exaggeration;
@@ -196,9 +196,9 @@ int view_settle(request *r, bool wants_increment, char **error) {
     if (v->has_token) {
         const rqt_view_band band = {v->last.move, v->last.turn};
         if (exaggeration == v->last.exaggeration && rqt_camera_holds(&v->last.camera, &band, &camera)) {
-            code = stay(r, wants_increment, error);
+            code = stay(r, wants == VIEW_INCREMENT, error);
             if (code != SQLITE_OK || v->is_unchanged) return code;
-        } else if (wants_increment) {
+        } else if (wants != VIEW_ANSWER) {
             code = find_last_mesh(r, error);
             if (code != SQLITE_OK) return code;
         }
@@ -277,5 +277,28 @@ int view_increment(request *r, uint8_t **bytes, size_t *size, char **error) {
     }
     rqt_patch_free(&mesh);
     sqlite3_free(token);
+    return code;
+}
+
+int view_morph(request *r, const rqt_patch *patch, double **heights, uint32_t **ends, char **error) {
+    view *v = r->view;
+    const size_t n = patch->vertex_count;
+    rqt_patch coarse = {0};
+    int code = SQLITE_OK;
+    *heights = sqlite3_malloc64((n + 1) * sizeof **heights);
+    *ends = sqlite3_malloc64((2 * n + 1) * sizeof **ends);
+    if (!*heights || !*ends) return SQLITE_NOMEM;
+    if (!r->previous) {
+        const double tau = v->achieved_tau;
+        v->achieved_tau = 2 * tau;
+        code = request_select_view(r, error);
+        if (code == SQLITE_OK) code = query(r, RQT_PRODUCT_TRIANGLES, &coarse, error);
+        v->achieved_tau = tau;
+    }
+    const rqt_patch *from = r->previous ? &v->last_mesh : &coarse;
+    if (code == SQLITE_OK &&
+        rqt_morph_heights(&r->terrain->lattice, from, patch, store_allocator(), *heights, *ends) != RQT_OK)
+        code = SQLITE_NOMEM;
+    rqt_patch_free(&coarse);
     return code;
 }

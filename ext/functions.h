@@ -33,6 +33,7 @@ typedef struct row_set {
     void *data;
     void (*column)(void *data, size_t row, int column, sqlite3_context *result);
     void (*release)(void *data); /* may be NULL */
+    uint32_t used;               /* told to fill: bit n, the query uses the nth of the further hidden columns */
 } row_set;
 
 /* Fill rows from the arguments (missing optional ones are NULL pointers); on failure *error is a sentence without
@@ -107,9 +108,11 @@ int request_read(connection *c, sqlite3_value *region, sqlite3_value *eps, sqlit
 /* The same from a camera: a view. */
 int request_read_view(connection *c, sqlite3_value *camera, sqlite3_value *terrain, sqlite3_value *options,
                       request *out, char **error);
-/* The same for what wants the mesh of the last answer, too (option previous): follow.c. */
+/* The same for what wants more of the last answer (option previous) than that it may be this one: an increment from
+ * it, when what selects is not needed where nothing changes, or its mesh. follow.c */
+typedef enum view_wants { VIEW_ANSWER, VIEW_INCREMENT, VIEW_MORPH } view_wants;
 int request_follow_view(connection *c, sqlite3_value *camera, sqlite3_value *terrain, sqlite3_value *options,
-                        bool wants_increment, request *out, char **error);
+                        view_wants wants, request *out, char **error);
 /* What selects for the view as it is now: field, region, rule, frame; instead of what did. */
 int request_select_view(request *r, char **error);
 /* A patch with what the product needs; of strips, the one that the options want. Give it back with store_keep. */

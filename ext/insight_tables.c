@@ -129,7 +129,7 @@ int fill_terrains(connection *c, sqlite3_value **arguments, row_set *rows, char 
     if (code != SQLITE_OK) return code;
     terrain_list *list;
     code = list_terrains(s, &list, error);
-    if (code == SQLITE_OK) *rows = (row_set){(size_t)list->count, list, terrains_column, release_terrains};
+    if (code == SQLITE_OK) *rows = (row_set){(size_t)list->count, list, terrains_column, release_terrains, 0};
     connection_done(c);
     return code;
 }
@@ -258,7 +258,7 @@ static int explain(request *r, row_set *rows, char **error) {
         if (e) release_explanation(e);
         return code;
     }
-    *rows = (row_set){e->reads.count, e, explain_column, release_explanation};
+    *rows = (row_set){e->reads.count, e, explain_column, release_explanation, 0};
     return SQLITE_OK;
 }
 
@@ -355,7 +355,7 @@ int fill_check(connection *c, sqlite3_value **arguments, row_set *rows, char **e
     }
     connection_done(c);
     if (code == SQLITE_OK)
-        *rows = (row_set){list->count, list, check_column, release_findings};
+        *rows = (row_set){list->count, list, check_column, release_findings, 0};
     else if (list)
         release_findings(list);
     return code;
@@ -392,6 +392,6 @@ static void help_column(void *data, size_t row, int column, sqlite3_context *res
 
 int fill_help(connection *c, sqlite3_value **arguments, row_set *rows, char **error) {
     (void)c, (void)arguments, (void)error;
-    *rows = (row_set){(size_t)rqt_function_count, NULL, help_column, NULL};
+    *rows = (row_set){(size_t)rqt_function_count, NULL, help_column, NULL, 0};
     return SQLITE_OK;
 }

@@ -97,16 +97,16 @@ int request_read(connection *c, sqlite3_value *region, sqlite3_value *eps, sqlit
 
 int request_read_view(connection *c, sqlite3_value *camera, sqlite3_value *terrain, sqlite3_value *options,
                       request *r, char **error) {
-    return request_follow_view(c, camera, terrain, options, false, r, error);
+    return request_follow_view(c, camera, terrain, options, VIEW_ANSWER, r, error);
 }
 
 int request_follow_view(connection *c, sqlite3_value *camera, sqlite3_value *terrain, sqlite3_value *options,
-                        bool wants_increment, request *r, char **error) {
+                        view_wants wants, request *r, char **error) {
     *r = (request){.mode = REQUEST_COVER, .eps = INFINITY};
     int code = view_create(camera, &r->view, error);
     if (code == SQLITE_OK) code = open(c, terrain, options, r, error);
     if (code == SQLITE_OK) code = view_place(r, error);
-    if (code == SQLITE_OK) code = view_settle(r, wants_increment, error);
+    if (code == SQLITE_OK) code = view_settle(r, wants, error);
     if (code != SQLITE_OK) request_free(r);
     return code;
 }

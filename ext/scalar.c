@@ -240,9 +240,9 @@ static void call_with_format(sqlite3_context *result, bool is_view, int count, s
     size_t size = 0;
     int code = read_format(arguments[first], &f, &error);
     if (code == SQLITE_OK)
-        code = is_view
-                   ? request_follow_view(c, arguments[0], terrain, options, f.family == MESH_INCREMENT, &r, &error)
-                   : request_read(c, arguments[0], arguments[1], terrain, options, REQUEST_COVER, &r, &error);
+        code = is_view ? request_follow_view(c, arguments[0], terrain, options,
+                                             f.family == MESH_INCREMENT ? VIEW_INCREMENT : VIEW_ANSWER, &r, &error)
+                       : request_read(c, arguments[0], arguments[1], terrain, options, REQUEST_COVER, &r, &error);
     if (code == SQLITE_OK && f.family == MESH_INCREMENT && !r.previous)
         code = fail(&error,
                     "format \"increment\" is for views with option \"previous\"; \"\" begins a sequence of them");

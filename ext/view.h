@@ -94,7 +94,8 @@ struct view {
     view_token last;
     bool is_unchanged;                             /* this answer is the last one */
     uint8_t unchanged[RQT_INCREMENT_HEADER_BYTES]; /* then, the increment that says so, if one is wanted */
-    rqt_patch last_mesh; /* of the last answer, sorted, with leaves, if an increment is wanted from it */
+    rqt_patch
+        last_mesh; /* of the last answer, sorted, with leaves, if an increment or a geomorph is wanted from it */
     bool has_last_mesh;
 };
 
@@ -104,7 +105,7 @@ int view_create(sqlite3_value *camera, view **out, char **error);
 int view_place(request *r, char **error);
 /* What selects: of the last answer, if its band holds the camera; else within what max_triangles allows. follow.c
  */
-int view_settle(request *r, bool wants_increment, char **error);
+int view_settle(request *r, view_wants wants, char **error);
 void view_free(view *v); /* NULL is fine */
 
 /* The view's field, of its camera, band and achieved_tau; and the request's region, the squares in which something
@@ -116,6 +117,11 @@ int view_nearest(request *r, double *nearest, char **error);
 int view_keep_within(request *r, char **error);
 /* The token of the answer, whose patch this is; NULL without option previous. To be released with sqlite3_free. */
 int view_token_of(request *r, const rqt_patch *patch, char **token, char **error);
+/* Where vertices of the answer, whose patch this is, come from: heights in quanta, NaN for those that do not move,
+ * and the ends of the edge that each halves, two a vertex (rqt_morph_heights). Both to be released with
+ * sqlite3_free. The last answer's mesh is that of VIEW_MORPH; without option previous it is that of twice the
+ * tolerance. The request then selects something else. */
+int view_morph(request *r, const rqt_patch *patch, double **heights, uint32_t **ends, char **error);
 /* The answer as an increment from the last one (FORMAT.md, "View increment"). */
 int view_increment(request *r, uint8_t **bytes, size_t *size, char **error);
 
