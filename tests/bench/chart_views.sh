@@ -122,13 +122,13 @@ set format y '%g'
 set yrange [*:*]
 set ylabel 'milliseconds'
 plot '$csv' every ::1 using 1:6 with lines lc rgb '#0072b2' lw 1.5 title 'fresh: strip', \\
-     '$csv' every ::1 using 1:8 with lines lc rgb '#d55e00' lw 1.5 title 'increment against the last answer'
+     '$csv' every ::1 using 1:8 with points lc rgb '#d55e00' pt 7 ps 0.4 title 'increment against the last answer'
 set origin 0,0.03
 set ylabel 'kilobytes'
 set xlabel 'frame'
 plot '$csv' every ::1 using 1:(\$9/1e3) with lines lc rgb '#0072b2' lw 1.5 title 'strip', \\
      '$csv' every ::1 using 1:(\$10/1e3) with lines lc rgb '#009e73' lw 1.5 title 'wire format', \\
-     '$csv' every ::1 using 1:(\$11/1e3) with lines lc rgb '#d55e00' lw 1.5 title 'increment'
+     '$csv' every ::1 using 1:(\$11/1e3) with points lc rgb '#d55e00' pt 7 ps 0.4 title 'increment'
 unset multiplot
 PLOT
     chart=$((chart + 1))
