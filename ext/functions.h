@@ -158,6 +158,8 @@ int fail(char **error, const char *format, ...);
 fill_rows fill_range, fill_triangles, fill_strip;                          /* mesh_tables.c */
 fill_rows fill_profile, fill_area;                                         /* profile.c, area.c */
 fill_rows fill_terrains, fill_explain, fill_verify, fill_check, fill_help; /* insight_tables.c, verify_table.c */
+fill_rows fill_view_verify;                                                /* view_verify.c */
+fill_rows fill_view_verify;                                                /* view_verify.c */
 scalar_call call_version, call_build_info, call_mesh, call_height;         /* scalar.c */
 scalar_call call_block_info, call_block_check, call_block_dump;            /* block_functions.c */
 scalar_call call_bbox, call_circle, call_corridor;                         /* shapes.c */
