@@ -126,8 +126,8 @@ typedef struct verify_scene {
     /* Asked of valid samples that are drawn and in no triangle: does the mesh have to cover this one, when its
      * outline may be off by `slack` metres of the scene? NULL: never. */
     bool (*is_promised)(void *context, int32_t col, int32_t row, double slack);
-    double slack; /* how far the outline may be off, pixels; metres of it are asked for what they are at the sample:
-                     no longer than what moves a point of the picture there by as much */
+    double slack; /* how far the outline may be off, pixels. In metres it is asked for as the radius of the largest
+                     ball about the sample no point of which is further than that from it in the picture */
     void *context;
 } verify_scene;
 

@@ -141,12 +141,13 @@ static void measure_triangle(picture *view, const verify_triangle *triangle) {
     }
 }
 
-/* Metres at a drawn point that move its place in the picture by no more than `pixels`: a ball of that radius lies
- * in a cone of half the angle asin(radius / distance), and up to the angle theta' from the axis the picture plane
- * stretches angles by at most focal / cos(theta')^2. */
+/* The largest distance from a drawn point within which nothing is further than `pixels` from it in the picture. In
+ * units of the focal length let it be t from the middle, and s what is allowed: seen from the eye, that is the
+ * angle from atan(t) to atan(t + s), outward, where the picture stretches most; its sine is s / sqrt((1 + t^2) (1 +
+ * (t + s)^2)), and a ball seen within that angle of its middle has a radius of the distance times that sine. */
 static double metres_of(const verify_camera *c, const double seen[3], double pixels) {
-    const double widest = hypot(seen[0], seen[1]) / seen[2] + pixels / c->focal;
-    return sqrt(dot(seen, seen)) * sin(fmin(pixels / c->focal / (1 + widest * widest), 1.5));
+    const double t = hypot(seen[0], seen[1]) / seen[2], s = pixels / c->focal;
+    return sqrt(dot(seen, seen)) * s / sqrt((1 + t * t) * (1 + (t + s) * (t + s)));
 }
 
 /* Is a sample in no triangle a hole in the picture? */

@@ -17,6 +17,6 @@ MUTANTS = [
      "if (row < s->row0 || row > south) continue;", "if (row <= s->row0 || row > south) continue;", "test_verify_view",
      "random_views_agree_with_the_slow_check"),
     ("view verifier: the outline's metres as if the picture plane were a sphere", "src/verify/verify_view.c",
-     "pixels / c->focal / (1 + widest * widest)", "pixels / c->focal", "test_verify_view",
+     "s / sqrt((1 + t * t) * (1 + (t + s) * (t + s)))", "s", "test_verify_view",
      "the_metres_of_a_slack_move_no_point_further"),
 ]
