@@ -72,7 +72,7 @@ void rqt_view_tolerance(const rqt_camera *camera, const rqt_prism *prism, rqt_vi
 
 /* ---------------------------------------------------------------------------------------------- other tests --
  * Tests of the literature, by name, for comparing: they guarantee nothing on the screen. Each says how large the
- * error of its own metric may be in a piece; METHODS.md has definitions, sources and what had to be mended. */
+ * error of its own metric may be in a piece; METHODS.md, "Views", has definitions, sources and what was mended. */
 typedef enum rqt_view_test {
     RQT_VIEW_GUARANTEED,
     RQT_VIEW_ULRICH,    /* seed of chunked quadtrees: error against the Chebyshev distance to the piece's box */
@@ -83,10 +83,29 @@ typedef enum rqt_view_test {
 } rqt_view_test;
 #define RQT_VIEW_TESTS 6
 
+/* What the tests see of a square of ground: the prism that holds its samples, and a box that does, which lies in
+ * the terrain's own directions: all points p with |(p - centre) . east| <= half_east, |(p - centre) . (up x east)|
+ * <= half_north and |(p - centre) . up| <= half_height, where centre, up and half_height are the prism's. */
+typedef struct rqt_view_piece {
+    rqt_prism prism;
+    double east[3]; /* unit, at right angles to prism.up */
+    double half_east, half_north;
+    int32_t side; /* of the square, in sample steps */
+} rqt_view_piece;
+
+/* The squares that have one eps each in RQT_VIEW_LODMAP: sides in sample steps. [RQT] has patches of 161 x 161
+ * samples; this is the power of two next to that. */
+#define RQT_VIEW_PATCH 128
+
 /* "guaranteed", "ulrich", "node", "sphere", "lindstrom", "lodmap"; NULL when there is none. */
 const char *rqt_view_test_name(rqt_view_test test);
-/* The bound of any test; of RQT_VIEW_GUARANTEED that of rqt_view_tolerance. */
-void rqt_view_test_bound(rqt_view_test test, const rqt_camera *camera, const rqt_prism *prism,
+/* The metric whose errors the test is about. Only RQT_METRIC_EXACT is stored. */
+rqt_metric rqt_view_test_metric(rqt_view_test test);
+/* The bound of any test; of RQT_VIEW_GUARANTEED that of rqt_view_tolerance. For the others eps is infinite and
+ * `shown` false where the prism misses the frustum; else eps is the least that the test allows in the piece, and
+ * share is that over the most that it allows there. RQT_VIEW_LODMAP has the share 0 in squares larger than a patch,
+ * which are not asked, and 1 in those that are not. eps may be 0 or infinite, never not a number. */
+void rqt_view_test_bound(rqt_view_test test, const rqt_camera *camera, const rqt_view_piece *piece,
                          rqt_view_bound *bound);
 
 #ifdef __cplusplus
