@@ -66,9 +66,9 @@ static int read_place(const cJSON *item, double place[3], char **error) {
         if (count == 3 || !cJSON_IsNumber(n) || !(fabs(n->valuedouble) <= FURTHEST)) break;
         place[count] = n->valuedouble;
     }
-    return count == 3 && !n ? SQLITE_OK
-                            : fail(error, "camera: \"%s\" must be three numbers [x, y, z], none beyond 1e15",
-                                   item->string);
+    return count == 3 && !n
+               ? SQLITE_OK
+               : fail(error, "camera: \"%s\" must be three numbers [x, y, z], none beyond 1e15", item->string);
 }
 
 static int read_position(const cJSON *item, camera_words *words, char **error) {
@@ -122,7 +122,8 @@ static int read_object(const cJSON *root, camera_words *words, char **error) {
 
 int camera_read(sqlite3_value *json, camera_words *words, char **error) {
     *words = (camera_words){.position = CAMERA_CRS};
-    if (!json || sqlite3_value_type(json) != SQLITE_TEXT) return fail(error, "camera must be a JSON object, as text");
+    if (!json || sqlite3_value_type(json) != SQLITE_TEXT)
+        return fail(error, "camera must be a JSON object, as text");
     const char *text = (const char *)sqlite3_value_text(json), *end = NULL;
     if (!text) return SQLITE_NOMEM;
     cJSON *root = cJSON_ParseWithOpts(text, &end, true);
@@ -137,8 +138,7 @@ int camera_read(sqlite3_value *json, camera_words *words, char **error) {
 
 /* Longitude and latitude as x and y of the terrain. */
 static int from_lonlat(connection *c, const store_terrain *t, double place[3], const char *what, char **error) {
-    if (fabs(place[1]) > 90)
-        return fail(error, "camera: \"%s\": there is no latitude %!.15g", what, place[1]);
+    if (fabs(place[1]) > 90) return fail(error, "camera: \"%s\": there is no latitude %!.15g", what, place[1]);
     char *text = sqlite3_mprintf("SRID=4326;POINT(%!.17g %!.17g)", place[0], place[1]);
     if (!text) return SQLITE_NOMEM;
     char name[24];

@@ -153,6 +153,8 @@ int lines_read(connection *c, const store_terrain *t, sqlite3_value *value, line
 void lines_free(line_set *lines);
 /* Metres in a unit of a terrain's x and y, where they are no angles; 1 when its CRS does not say. */
 double terrain_metre(const store_terrain *t);
+/* Are its heights above EGM96, as far as its source says? frame.c */
+bool terrain_is_above_geoid(const store_terrain *t);
 /* Options of the contract; sentences name what is unknown and what is not in this version. options.c */
 int options_read(const char *json, request *r, char **error);
 
@@ -161,13 +163,14 @@ int fail(char **error, const char *format, ...);
 
 /* The functions themselves, by file. */
 fill_rows fill_range, fill_triangles, fill_strip;                          /* mesh_tables.c */
+fill_rows fill_view, fill_view_triangles, fill_view_strip;                 /* mesh_tables.c */
 fill_rows fill_profile, fill_area;                                         /* profile.c, area.c */
+fill_rows fill_view_explain;                                               /* insight_tables.c */
 fill_rows fill_terrains, fill_explain, fill_verify, fill_check, fill_help; /* insight_tables.c, verify_table.c */
 fill_rows fill_view_verify;                                                /* view_verify.c */
-fill_rows fill_view_verify;                                                /* view_verify.c */
-scalar_call call_version, call_build_info, call_mesh, call_height;         /* scalar.c */
-scalar_call call_block_info, call_block_check, call_block_dump;            /* block_functions.c */
-scalar_call call_bbox, call_circle, call_corridor;                         /* shapes.c */
-scalar_call call_delta;                                                    /* delta.c */
+scalar_call call_version, call_build_info, call_mesh, call_view_mesh, call_height; /* scalar.c */
+scalar_call call_block_info, call_block_check, call_block_dump;                    /* block_functions.c */
+scalar_call call_bbox, call_circle, call_corridor;                                 /* shapes.c */
+scalar_call call_delta;                                                            /* delta.c */
 
 #endif

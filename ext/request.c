@@ -1,5 +1,5 @@
-/* request.c - region and eps, or a camera, with terrain and options out of SQL values: one reading of them for every
- * function. */
+/* request.c - region and eps, or a camera, with terrain and options out of SQL values: one reading of them for
+ * every function. */
 #include "view.h"
 
 #include <math.h>

@@ -1,7 +1,6 @@
 /* scene.c - the scene of a terrain, and the pieces of it that hold its squares.
  *
- * *Planar* (projected, or no CRS): a square is a box; its prism the cylinder around it. Heights are counted along
- * the axis: tilt 0.
+ * *Planar* (projected, or no CRS): a square is a box; its prism the cylinder around it.
  *
  * *Geocentric* (degrees). Let E be the ellipsoid, n its normal, c the middle of the square in longitude and
  * latitude, a and b the halves of its sides there in radians, and C the largest cosine of a latitude in it. The
@@ -10,9 +9,9 @@
  *
  *     (2 sin(g/2))^2 = (2 sin(dlat/2))^2 + cos cos (2 sin(dlon/2))^2 <= a^2 + C^2 b^2 =: u^2
  *
- * so g <= G = 2 asin(u/2): that is the tilt. 1 - cos g <= u^2/2 =: v and sin g <= u. On the way from c to the place
- * along the great circle of normals, E moves by L t dg, t the direction of the way and L symmetric in the plane at a
- * right angle to n, with the two principal radii of curvature for its values: none above R, that of the poles. So
+ * so g <= G = 2 asin(u/2), 1 - cos g <= u^2/2 =: v and sin g <= u. On the way from c to the place
+ * along the great circle of normals, E moves by L t dg, t the direction of the way and L symmetric in the plane at
+ * a right angle to n, with the two principal radii of curvature for its values: none above R, that of the poles. So
  *
  *     |E - E(c)| <= R g,      0 <= -(E - E(c)) . n(c) = integral of sin(g) (t . L t) dg <= R (1 - cos g) <= R v
  *
@@ -71,6 +70,22 @@ void scene_axes(const scene *s, const double place[3], double east[3], double no
     memcpy(up, axes[s->space != NULL][2], 3 * sizeof *up);
 }
 
+int scene_from_geocentric(const scene *s, double place[3], const char *what, char **error) {
+    const bool geoid = terrain_is_above_geoid(s->terrain);
+    const geo_ellipsoid earth = s->space ? s->ellipsoid : GEO_WGS84;
+    geo_frame *frame;
+    double lonlath[3];
+    char why[256] = "";
+    const int status = geo_frame_create(GEO_ECEF, &earth, 0, 0, geoid, &frame, why, sizeof why);
+    if (status != GEO_OK)
+        return status == GEO_NO_MEMORY ? SQLITE_NOMEM : fail(error, "camera: \"%s\": %s", what, why);
+    geo_frame_lonlath(frame, place, lonlath);
+    geo_frame_free(frame);
+    if (!isfinite(lonlath[2])) return fail(error, "camera: \"%s\" has no place on the Earth", what);
+    memcpy(place, lonlath, sizeof lonlath);
+    return SQLITE_OK;
+}
+
 /* -------------------------------------------------------------------------------------------------- prisms -- */
 
 /* Of numbers of this size, a dozen operations. */
@@ -89,7 +104,6 @@ static void planar_prism(const scene *s, const double low[3], const double high[
     const double slack = rounding(size * fmax(s->metre, s->exaggeration));
     prism->radius = hypot(high[0] - low[0], high[1] - low[1]) / 2 * s->metre + slack;
     prism->half_height = (high[2] - low[2]) / 2 * s->exaggeration + slack;
-    prism->tilt = 0;
 }
 
 static void geocentric_prism(const scene *s, const double low[3], const double high[3], rqt_prism *prism) {
@@ -107,7 +121,6 @@ static void geocentric_prism(const scene *s, const double low[3], const double h
     const double slack = rounding(polar + most);
     prism->radius = polar * angle + most * u + slack;
     prism->half_height = (hi - lo) / 2 + polar * v / 2 + most * v + slack;
-    prism->tilt = fmin(angle * (1 + 1e-12) + 1e-12, 2 * acos(0));
 }
 
 void scene_prism(const scene *s, int32_t x0, int32_t y0, int32_t x1, int32_t y1, const double range[2],

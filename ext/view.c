@@ -1,6 +1,6 @@
 /* view.c - a view as a request: what may be seen is its region, the camera's field its rule, eps infinite. So every
- * answer to a view is an answer like any other, in rows, strips and files. Outlines of voids are `tol`: they may move
- * by as much as heights may. */
+ * answer to a view is an answer like any other, in rows, strips and files. Outlines of voids are `tol`: they may
+ * move by as much as heights may. */
 #include "view.h"
 
 int view_create(sqlite3_value *camera, view **out, char **error) {

@@ -1,9 +1,9 @@
 /* view.h - views: from a camera in JSON to a request that the mesh functions answer like any other.
  *
  *   camera.c      the JSON, and the camera that it makes in a scene
- *   scene.c       the scene of a terrain: where its samples are in space, and pieces of space that hold squares of it
- *   view_field.c  scene and camera -> an eps for every square of ground (rqt_field), and the squares that may be seen
- *   view.c        all of it, as a request: region = what may be seen, eps = infinity, rule = the field
+ *   scene.c       the scene of a terrain: where its samples are in space, and pieces of space that hold squares of
+ * it view_field.c  scene and camera -> an eps for every square of ground (rqt_field), and the squares that may be
+ * seen view.c        all of it, as a request: region = what may be seen, eps = infinity, rule = the field
  */
 #ifndef RQT_EXT_VIEW_H
 #define RQT_EXT_VIEW_H
@@ -25,7 +25,8 @@ typedef struct scene {
 
 int scene_create(scene *s, const store_terrain *t, double exaggeration, char **error);
 void scene_free(scene *s);
-/* A geocentric place as longitude, latitude and the height that the terrain would give it. `what`: for sentences. */
+/* A geocentric place as longitude, latitude and the height that the terrain would give it. `what`: for sentences.
+ */
 int scene_from_geocentric(const scene *s, double place[3], const char *what, char **error);
 /* Where x, y of the terrain's CRS and a height in metres are in the scene. `exaggeration`: of this height. */
 void scene_place(const scene *s, const double place[3], double exaggeration, double point[3]);

@@ -1,12 +1,12 @@
 /* view_field.c - what a camera allows each square of a terrain: the field, and what of the ground may be seen.
  *
  * From the root down, a square's heights come from the summaries of the store (store_relief), as far as there are
- * blocks of its size, and from the square around it below. Its prism and the test give its eps. A square is cut into
- * quarters while that pays: while what it costs as a whole (eps at its worst point, used for all of it) is well
- * below what its parts would be allowed, or while it is neither wholly in the picture nor wholly outside.
+ * blocks of its size, and from the square around it below. Its prism and the test give its eps. A square is cut
+ * into quarters while that pays: while what it costs as a whole (eps at its worst point, used for all of it) is
+ * well below what its parts would be allowed, or while it is neither wholly in the picture nor wholly outside.
  *
- * The squares that may be seen are the region of the query: rings of one polygon in samples, the sides of neighbours
- * cancel (region_snap.c does the same). What is elsewhere cannot be drawn. */
+ * The squares that may be seen are the region of the query: rings of one polygon in samples, the sides of
+ * neighbours cancel (region_snap.c does the same). What is elsewhere cannot be drawn. */
 #include "view.h"
 
 #include <math.h>
@@ -97,8 +97,7 @@ static int region_of(const square_list *list, const store_terrain *t, rqt_region
     uint8_t *bytes = rings_of(list, &t->lattice, &size);
     rqt_status status = RQT_NO_MEMORY;
     if (bytes) status = rqt_geometry_parse(bytes, size, false, store_allocator(), &geometry, &why);
-    if (status == RQT_OK)
-        status = rqt_region_create(geometry, &samples, &t->lattice, store_allocator(), region);
+    if (status == RQT_OK) status = rqt_region_create(geometry, &samples, &t->lattice, store_allocator(), region);
     rqt_geometry_free(geometry);
     sqlite3_free(bytes);
     return status == RQT_OK ? SQLITE_OK : SQLITE_NOMEM;
@@ -131,7 +130,7 @@ static rqt_field_step decide(void *context, rqt_square square, double *eps) {
     rqt_prism prism;
     rqt_view_bound bound;
     scene_prism(&v->scene, square.x, square.y, end.x, end.y, b->range[level], &prism);
-    rqt_view_test_bound(v->test, &v->camera, &prism, &bound);
+    rqt_view_tolerance(&v->camera, &prism, &bound);
     if (bound.share < SHARE_WORTH_SPLITTING && square.side > 1) return RQT_FIELD_SPLIT;
     *eps = bound.eps / v->scene.exaggeration;
     if (!bound.shown || add_square(&b->shown, square)) return RQT_FIELD_LEAF;

@@ -2,17 +2,17 @@
  *
  * The cell of a block of k > 0 is cut by its main or its other diagonal into two halves, and both have the cell's
  * centre C for their split vertex: they are the diamond of C. So the error of C is at least the distance of any
- * valid sample of a half from the plane of its corners, if those are valid; the saturated error, which is stored and
- * rounded up, is not less. A plane over a triangle lies between the least and the greatest of its corners. So with e
- * = center_error and all four corners valid,
+ * valid sample of a half from the plane of its corners, if those are valid; the saturated error, which is stored
+ * and rounded up, is not less. A plane over a triangle lies between the least and the greatest of its corners. So
+ * with e = center_error and all four corners valid,
  *
  *     least corner - e  <=  z  <=  greatest corner + e          for every valid sample z of the closed cell.
  *
  * That holds at the raster's end too, where corners are clamped: the clamped halves that have an area tile the
  * clamped cell, so each of its samples is in one, which was measured; a cell that exists has an area. All but those
  * of a raster of one row or column, of which no triangle was measured: nothing is said of them here. Nor where a
- * corner is void: a mixed triangle's plane is not looked at. There, for k = 0, and beneath the finest blocks, a cell
- * lies where the one around it does; the root lies between the extremes of the terrain.
+ * corner is void: a mixed triangle's plane is not looked at. There, for k = 0, and beneath the finest blocks, a
+ * cell lies where the one around it does; the root lies between the extremes of the terrain.
  *
  * Heights are widened by half a quantum, where samples were rounded to them, and by what doubles round away.
  *
@@ -24,8 +24,8 @@
 
 /* From one height to another, and what the stored ones are off. */
 static void widen(const store_terrain *t, double a, double b, double by, double range[2]) {
-    const double size = fabs((double)t->unit.z0 * rqt_unit_factor(&t->unit)) + fabs(t->unit.offset) + fabs(a) +
-                        fabs(b) + by;
+    const double size =
+        fabs((double)t->unit.z0 * rqt_unit_factor(&t->unit)) + fabs(t->unit.offset) + fabs(a) + fabs(b) + by;
     const double slack = by + t->quantum_error + size * 0x1p-48;
     range[0] = fmin(a, b) - slack;
     range[1] = fmax(a, b) + slack;
