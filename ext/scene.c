@@ -123,12 +123,12 @@ static void geocentric_prism(const scene *s, const double low[3], const double h
     prism->half_height = (hi - lo) / 2 + polar * v / 2 + most * v + slack;
 }
 
-void scene_prism(const scene *s, int32_t x0, int32_t y0, int32_t x1, int32_t y1, const double range[2],
+void scene_prism(const scene *s, int32_t x0, int32_t y0, int32_t x1, int32_t y1, double lowest, double highest,
                  rqt_prism *prism) {
     const rqt_placement *at = &s->terrain->placement;
     const double xa = at->x0 + x0 * at->dx, xb = at->x0 + x1 * at->dx;
     const double ya = at->y0 + y0 * at->dy, yb = at->y0 + y1 * at->dy;
-    const double low[3] = {fmin(xa, xb), fmin(ya, yb), range[0]}, high[3] = {fmax(xa, xb), fmax(ya, yb), range[1]};
+    const double low[3] = {fmin(xa, xb), fmin(ya, yb), lowest}, high[3] = {fmax(xa, xb), fmax(ya, yb), highest};
     if (s->space)
         geocentric_prism(s, low, high, prism);
     else

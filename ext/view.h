@@ -32,9 +32,9 @@ int scene_from_geocentric(const scene *s, double place[3], const char *what, cha
 void scene_place(const scene *s, const double place[3], double exaggeration, double point[3]);
 /* East, north and up there: unit. In a projected system grid east and grid north. */
 void scene_axes(const scene *s, const double place[3], double east[3], double north[3], double up[3]);
-/* A piece of the scene that holds all samples of columns x0 .. x1, rows y0 .. y1 whose heights are in range
- * (metres, not exaggerated). scene.c has the proof. */
-void scene_prism(const scene *s, int32_t x0, int32_t y0, int32_t x1, int32_t y1, const double range[2],
+/* A piece of the scene that holds all samples of columns x0 .. x1, rows y0 .. y1 whose heights are
+ * lowest .. highest (metres, not exaggerated). scene.c has the proof. */
+void scene_prism(const scene *s, int32_t x0, int32_t y0, int32_t x1, int32_t y1, double lowest, double highest,
                  rqt_prism *prism);
 
 /* ----------------------------------------------------------------------------------------------- camera */

@@ -52,7 +52,7 @@ static double dot(const double a[3], const double b[3]) {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 static double larger(double a, double b) {
-    return a > b ? a : b;
+    return a >= b ? a : b;
 }
 static double smaller(double a, double b) {
     return a < b ? a : b;
@@ -89,6 +89,10 @@ static bool roll(rqt_camera *camera, const double vertical[3]) {
     cross(camera->forward, vertical, side);
     if (!(dot(side, side) > PARALLEL * PARALLEL)) return false;
     (void)make_unit(side, camera->right);
+    /* What rounding made of short sides is taken off. */
+    const double off = dot(camera->right, camera->forward);
+    for (int c = 0; c < 3; c++) camera->right[c] -= off * camera->forward[c];
+    (void)make_unit(camera->right, camera->right);
     cross(camera->right, camera->forward, camera->up);
     return make_unit(camera->up, camera->up);
 }
@@ -240,10 +244,8 @@ void rqt_view_tolerance(const rqt_camera *camera, const rqt_prism *prism, rqt_vi
 
     /* The best that a part of it could have, far away and near the axis. Beyond the frustum more, which is of no
      * use where no part is drawn: there it only has to be no less than what the neighbours have. */
-    const double farthest = smaller(sqrt((fabs(s.along) + s.half_height) * (fabs(s.along) + s.half_height) +
-                                         (s.across + s.radius) * (s.across + s.radius)),
-                                    camera->far * sqrt(1 + corner * corner)),
-                 seen = kappa(pixel, least) * larger(farthest, camera->near),
+    const double deep = fabs(s.along) + s.half_height, wide = s.across + s.radius,
+                 seen = kappa(pixel, least) * larger(sqrt(deep * deep + wide * wide), camera->near),
                  best = bound->shown ? larger(seen, g.farthest) : seen;
     bound->share = best > 0 ? smaller(bound->eps / best, 1) : 1;
     if (!(isfinite(slack) && isfinite(drawn) && isfinite(bound->eps) && bound->eps >= 0 && bound->share >= 0))
