@@ -102,7 +102,7 @@ def single(values):
 
 t = terrains["voids"]  # northings of 5.1e6 m, where single precision has steps of half a metre
 ground = t.db.execute("SELECT rqt_height(562000, 5116000)").fetchone()[0]
-camera = {"eye": [562000.3, 5116000.7, ground + 3], "yaw": 20, "pitch": 0, "fovy": 50, "width": 1280, "height": 800, "tau": 1}
+camera = {"eye": [562000.3, 5116000.7, ground + 3], "yaw": 90, "pitch": 0, "fovy": 50, "width": 1280, "height": 800, "tau": 1}
 view = rows(t.db, "SELECT x, y, z FROM rqt_view(?)", json.dumps(camera))
 blob = t.db.execute("SELECT rqt_view_mesh(?, 'indexed')", (json.dumps(camera),)).fetchone()[0]
 points = {p for triangle in s.mesh_blob(blob)[1] for p in triangle}
