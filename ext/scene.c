@@ -2,10 +2,11 @@
  *
  * *Planar* (projected, or no CRS): a square is a box; its prism the cylinder around it.
  *
- * *Geocentric* (degrees). Let E be the ellipsoid, n its normal, c the middle of the square in longitude and
- * latitude, a and b the halves of its sides there in radians, and C the largest cosine of a latitude in it. The
- * sample of height h at a place of it is p = E + h n, and lo <= h <= hi, |h| <= H. Let g be the angle from n(c) to
- * n; by the haversine formula
+ * *Geocentric* (degrees): on the ellipsoid of the terrain's CRS. Heights are taken as above it, unless the answer
+ * is to be in space too (option frame) and they are above a geoid: then the scene is where the answer is. Let E be
+ * the ellipsoid, n its normal, c the middle of the square in longitude and latitude, a and b the halves of its
+ * sides there in radians, and C the largest cosine of a latitude in it. The sample of height h at a place of it is
+ * p = E + h n, and lo <= h <= hi, |h| <= H. Let g be the angle from n(c) to n; by the haversine formula
  *
  *     (2 sin(g/2))^2 = (2 sin(dlat/2))^2 + cos cos (2 sin(dlon/2))^2 <= a^2 + C^2 b^2 =: u^2
  *
@@ -20,6 +21,9 @@
  *
  *     half_height = (hi - lo)/2 + R v/2 + H v,      radius = R G + H u.
  *
+ * With a geoid G, heights are h + G, and E(c) is raised by G(c): lo and hi become lower and higher by as much as G
+ * can change from c to the place, by its slopes, and H larger by the largest |G|.
+ *
  * All is widened by what doubles round away. */
 #include "view.h"
 
@@ -28,7 +32,7 @@
 
 #define DEGREE 0.017453292519943295
 
-int scene_create(scene *s, const store_terrain *t, double exaggeration, char **error) {
+int scene_create(scene *s, const store_terrain *t, double exaggeration, bool geoid, char **error) {
     *s = (scene){.terrain = t, .exaggeration = exaggeration, .metre = 1, .ellipsoid = GEO_WGS84};
     if (!t->lonlat) {
         s->metre = terrain_metre(t);
@@ -37,9 +41,14 @@ int scene_create(scene *s, const store_terrain *t, double exaggeration, char **e
     if (!t->wgs84 && !geo_ellipsoid_of_wkt(t->crs, &s->ellipsoid))
         return fail(error, "the CRS of terrain %s names no ellipsoid", t->name);
     char why[256] = "";
-    const int status = geo_frame_create(GEO_ECEF, &s->ellipsoid, 0, 0, false, &s->space, why, sizeof why);
-    if (status == GEO_OK) return SQLITE_OK;
-    return status == GEO_NO_MEMORY ? SQLITE_NOMEM : fail(error, "%s", why);
+    const int status = geo_frame_create(GEO_ECEF, &s->ellipsoid, 0, 0, geoid, &s->space, why, sizeof why);
+    if (status != GEO_OK) return status == GEO_NO_MEMORY ? SQLITE_NOMEM : fail(error, "%s", why);
+    const rqt_placement *at = &t->placement;
+    const double x = at->x0 + (t->lattice.width - 1) * at->dx, y = at->y0 + (t->lattice.height - 1) * at->dy;
+    const geo_extent extent = {
+        .west = fmin(at->x0, x), .east = fmax(at->x0, x), .south = fmin(at->y0, y), .north = fmax(at->y0, y)};
+    s->geoid = geo_frame_geoid(s->space, &extent);
+    return SQLITE_OK;
 }
 
 void scene_free(scene *s) {
@@ -108,7 +117,9 @@ static void planar_prism(const scene *s, const double low[3], const double high[
 
 static void geocentric_prism(const scene *s, const double low[3], const double high[3], rqt_prism *prism) {
     const double polar = s->ellipsoid.a / (1 - s->ellipsoid.f); /* a^2 / b: R */
-    const double lo = low[2] * s->exaggeration, hi = high[2] * s->exaggeration, most = fmax(fabs(lo), fabs(hi));
+    const double wave = s->geoid.lon_slope * (high[0] - low[0]) / 2 + s->geoid.lat_slope * (high[1] - low[1]) / 2;
+    const double lo = low[2] * s->exaggeration - wave, hi = high[2] * s->exaggeration + wave;
+    const double most = fmax(fabs(lo), fabs(hi)) + s->geoid.most;
     const double nearest = low[1] <= 0 && high[1] >= 0 ? 0 : fmin(fabs(low[1]), fabs(high[1]));
     const double cosine = fmin(1, fabs(cos(nearest * DEGREE)) + 1e-12);
     const double a = (high[1] - low[1]) / 2 * DEGREE, b = (high[0] - low[0]) / 2 * DEGREE;

@@ -24,7 +24,8 @@ int view_place(request *r, char **error) {
     view *v = r->view;
     if (r->mode != REQUEST_COVER) return fail(error, "option \"mode\" of a view must be cover");
     if (r->max_vertices > 0) return fail(error, "option \"max_vertices\" does not go with a view");
-    int code = scene_create(&v->scene, r->terrain, v->words.exaggeration, error);
+    const bool geoid = r->frame_kind != FRAME_CRS && terrain_is_above_geoid(r->terrain);
+    int code = scene_create(&v->scene, r->terrain, v->words.exaggeration, geoid, error);
     if (code == SQLITE_OK) code = camera_make(r->connection, &v->scene, &v->words, &v->camera, error);
     if (code == SQLITE_OK) code = view_field(r, v, &r->region, error);
     v->guaranteed = v->test == RQT_VIEW_GUARANTEED;

@@ -21,9 +21,11 @@ typedef struct scene {
     double metre;        /* planar: metres in a unit of x and y */
     geo_frame *space;    /* NULL: planar */
     geo_ellipsoid ellipsoid;
+    geo_geoid geoid; /* under the terrain; 0 where heights are taken as above the ellipsoid */
 } scene;
 
-int scene_create(scene *s, const store_terrain *t, double exaggeration, char **error);
+/* geoid: heights of a terrain in degrees are above EGM96. */
+int scene_create(scene *s, const store_terrain *t, double exaggeration, bool geoid, char **error);
 void scene_free(scene *s);
 /* A geocentric place as longitude, latitude and the height that the terrain would give it. `what`: for sentences.
  */
