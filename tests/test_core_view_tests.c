@@ -296,7 +296,9 @@ static void what_is_behind_the_eye_is_left_out(void **state) {
 /* An eye in a box, on a vertex, below ground, 10^9 m away, without end: a number. */
 static void F31_strange_eyes_get_a_number(void **state) {
     (void)state;
-    const double eyes[][3] = {{0, 0, 0}, {0, 0, -5}, {0, 0, 1e9}, {1e9, -1e9, 1e-9}, {1e300, 0, 0}, {0, 0, 5e-324}};
+    const double eyes[][3] = {{0, 0, 0},         {0, 0, -5},    {0, 0, 1e9},
+                              {1e9, -1e9, 1e-9}, {1e300, 0, 0}, {1e300, 1e300, 1e300},
+                              {0, 0, 5e-324}};
     for (size_t e = 0; e < sizeof eyes / sizeof *eyes; e++) {
         const double directions[][3] = {{0, 0, -1}, {0, 1, 0}, {-1, 1, 0}, {0, 0, 1}};
         for (int d = 0; d < 4; d++) {
@@ -321,6 +323,30 @@ static void F31_strange_eyes_get_a_number(void **state) {
     const rqt_view_piece p = piece_at(0, 0, 0, 10, 1);
     assert_true(bound_of(RQT_VIEW_ULRICH, &c, &p).eps == 0 && bound_of(RQT_VIEW_SPHERE, &c, &p).eps == 0);
     assert_true(bound_of(RQT_VIEW_LINDSTROM, &c, &p).eps == 0);
+}
+
+/* A scene and the same 10^7 m further north and east: what is near the eye is told as exactly. */
+static void F34_far_from_the_origin_a_test_says_the_same(void **state) {
+    (void)state;
+    random_begin("far off");
+    const double far_off[3] = {1e7, 1e7, 4000};
+    for (int round = 0; round < 2000; round++) {
+        rqt_camera c = random_camera();
+        const rqt_view_piece p = random_piece(&c);
+        rqt_camera there = c;
+        rqt_view_piece moved = p;
+        for (int i = 0; i < 3; i++) {
+            there.eye[i] += far_off[i];
+            moved.prism.centre[i] += far_off[i];
+        }
+        for (int t = 0; t < RQT_VIEW_TESTS; t++) {
+            const rqt_view_bound a = bound_of((rqt_view_test)t, &c, &p),
+                                 b = bound_of((rqt_view_test)t, &there, &moved);
+            if (a.shown != b.shown || t == RQT_VIEW_LINDSTROM) continue; /* on the frustum's border; over the eye */
+            CHECK(a.eps == b.eps || fabs(a.eps - b.eps) <= 1e-6 * (1 + a.eps + a.distance),
+                  "%s: %.17g, and far off %.17g", rqt_view_test_name((rqt_view_test)t), a.eps, b.eps);
+        }
+    }
 }
 
 /* ------------------------------------------------------------------------------------- counterexamples -- */
@@ -410,6 +436,7 @@ int main(void) {
         TEST(a_piece_gets_the_least_of_its_points_and_is_shown_with_one),
         TEST(what_is_behind_the_eye_is_left_out),
         TEST(F31_strange_eyes_get_a_number),
+        TEST(F34_far_from_the_origin_a_test_says_the_same),
         TEST(F32_named_tests_break_tau_off_the_axis),
         TEST(F33_lindstrom_asks_nothing_straight_down),
         TEST(a_middle_is_not_where_a_piece_is_nearest),

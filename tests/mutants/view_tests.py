@@ -42,4 +42,16 @@ MUTANTS = [
     ("tests of views: F32 the guaranteed test is another's", TESTS,
      "    if (test == RQT_VIEW_GUARANTEED) {\n", "    if (test == RQT_VIEW_GUARANTEED) test = RQT_VIEW_SPHERE;\n    if (test == RQT_VIEW_GUARANTEED) {\n",
      "test_core_view_tests", "F32_named_tests_break_tau_off_the_axis"),
+    ("tests of views: F34 the eye is subtracted in single precision", TESTS,
+     "prism->centre[i] - camera->eye[i]", "(double)((float)prism->centre[i] - (float)camera->eye[i])",
+     "test_core_view_tests", "F34_far_from_the_origin_a_test_says_the_same"),
+    # the fitted plane
+    ("fit: planes do not tilt south", "src/core/fit.c", "f.gy = (f.yz * f.xx - f.xz * f.xy) / area;", "f.gy = f.yz / f.yy;",
+     "test_core_metric", FIT),
+    ("fit: means are the first corner's", "src/core/fit.c", "f.mz = (double)f.z / (double)f.n;", "f.mz = 0;", "test_core_metric", FIT),
+    ("fit: void samples count", "src/core/fit.c", "s->valid ? s->valid + sample_index(s, 0, y) : NULL", "NULL", "test_core_metric", FIT),
+    ("fit: samples in a row are fitted level", "src/core/fit.c", "} else if (length > 0) {", "} else if (length < 0) {",
+     "test_core_metric", FIT),
+    ("fit: rounding is relief", "src/core/fit.c", "return mean < 0x1p-40 * (double)s->relief ? 0 : mean;", "return mean;",
+     "test_core_metric", FIT),
 ]
