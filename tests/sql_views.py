@@ -204,6 +204,24 @@ def prove(db, camera, options=None):
     return seen
 
 
+def is_outside(camera, low, high, pixels):
+    """Is a box of a projected terrain wholly beyond one side of the frustum, grown by that many pixels? The camera has yaw and pitch, and
+    neither near nor far."""
+    focal = camera["height"] / 2 / math.tan(math.radians(camera["fovy"] / 2))
+    yaw, pitch = math.radians(camera["yaw"]), math.radians(camera["pitch"])
+    forward = (math.sin(yaw) * math.cos(pitch), math.cos(yaw) * math.cos(pitch), math.sin(pitch))
+    right = (math.cos(yaw), -math.sin(yaw), 0)
+    up = tuple(right[(k + 1) % 3] * forward[(k + 2) % 3] - right[(k + 2) % 3] * forward[(k + 1) % 3] for k in range(3))
+    wide, tall = (camera["width"] / 2 + pixels) / focal, (camera["height"] / 2 + pixels) / focal
+    seen = []
+    for corner in range(8):
+        ray = [(high if corner >> k & 1 else low)[k] - camera["eye"][k] for k in range(3)]
+        seen.append([sum(a * b for a, b in zip(ray, axis)) for axis in (right, up, forward)])
+    sides = (lambda p: p[2] <= 0, lambda p: p[0] > wide * p[2], lambda p: -p[0] > wide * p[2], lambda p: p[1] > tall * p[2],
+             lambda p: -p[1] > tall * p[2])
+    return any(all(side(p) for p in seen) for side in sides)
+
+
 def faults(seen):
     """What of a guaranteed view is not as promised; "" when all is."""
     wrong = []

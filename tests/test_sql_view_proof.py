@@ -4,6 +4,7 @@ whose code knows nothing of how views select. RQT_SEED begins the random ones; R
 import json
 import math
 import os
+import sqlite3
 import struct
 
 import sql_support as s
@@ -26,7 +27,11 @@ def prove_all(t, cameras):
     """What of these is not as promised, and all rows by kind."""
     bad, seen = [], {}
     for kind, camera in cameras:
-        row = v.prove(t.db, camera)
+        try:
+            row = v.prove(t.db, camera)
+        except sqlite3.Error as error:
+            bad.append("%s: %s of %s" % (kind, error, json.dumps(camera)))
+            continue
         if v.faults(row):
             bad.append("%s: %s of %s" % (kind, v.faults(row), json.dumps(camera)))
         seen.setdefault(kind, []).append(row)
@@ -120,5 +125,29 @@ def furthest(other):
 
 check("F34_vertices_of_a_mesh_are_doubles_so_that_the_eye_can_be_taken_from_them_before_single_precision",
       points == set(view) and furthest(by_eye) < 0.001 and furthest(naive) > 2, (len(points), len(view), furthest(by_eye), furthest(naive)))
+
+# ------------------------------------------------------------------------------------------------------- what is read
+# No bytes of a block that lies wholly beside the picture: blocks are read for what may be drawn, and closure needs no others.
+database = s.temp("small_blocks.gpkg")
+s.import_terrain(database, os.path.join(s.DATA, SOURCES["voids"]), name="t", block=4)
+t, dice, needless, read, drawing = v.Terrain(s.connect(database)), s.Dice(SEED + 4), [], 0, 0
+total = t.db.execute("SELECT blocks FROM rqt_terrains").fetchone()[0]
+for n in range(30):
+    camera = {"eye": v.above(t, dice, v.log_share(dice, 2, t.size)), "yaw": v.share(dice, -180, 180), "pitch": v.share(dice, -70, 10),
+              "fovy": v.share(dice, 5, 60), "width": 1280, "height": 800, "tau": v.log_share(dice, 0.2, 20)}
+    before = read
+    for extent, number in rows(t.db, "SELECT extent, bytes FROM rqt_view_explain(?)", json.dumps(camera)):
+        if not number:
+            continue
+        read += 1
+        points = [tuple(map(float, p.split())) for p in extent[9:-2].split(",")]
+        low, high = [min(p[k] for p in points) for k in (0, 1)], [max(p[k] for p in points) for k in (0, 1)]
+        grown = max(high[k] - low[k] for k in (0, 1)) / 4  # pieces of ground are taken as round
+        low, high = [c - grown for c in low] + [t.min_z], [c + grown for c in high] + [t.max_z]
+        if v.is_outside(camera, low, high, 2 * camera["tau"] + 1):
+            needless.append((extent, camera))
+    drawing += read > before
+equal("no block is read that lies beside the picture", needless[:1], [])
+check("and few of all are", drawing > 15 and 100 < read < drawing * total / 4, (drawing, read, total))
 
 s.finish()
