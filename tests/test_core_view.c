@@ -326,6 +326,12 @@ static void F31_eyes_inside_on_faces_and_far_away(void **state) {
         rqt_view_tolerance(&s.camera, &s.prism, &b);
         CHECK(b.eps == 0 && b.shown && b.distance == 0 && b.share == 0, "eye %g: eps %g", wild[n], b.eps);
     }
+    for (int n = 0; n < 100; n++) {
+        s = random_scene(AROUND, 60);
+        s.camera.tau = INFINITY;
+        rqt_view_tolerance(&s.camera, &s.prism, &b);
+        CHECK(b.eps == 0 && b.shown && b.share == 0, "no number of pixels: eps %g", b.eps);
+    }
 }
 
 static void F33_straight_down(void **state) {
@@ -463,6 +469,43 @@ static void what_is_not_drawn_may_be_as_wrong_as_its_gap(void **state) {
           count, share[count / 2], share[count / 10]);
 }
 
+static void near_and_far_end_what_is_shown(void **state) {
+    (void)state;
+    random_begin(__func__);
+    int within = 0;
+    for (int n = 0; n < 2000; n++) {
+        scene s = piece_in_view(random_size(0.01, 60), 0);
+        rqt_camera *c = &s.camera;
+        const rqt_prism *p = &s.prism;
+        rqt_view_bound all, b;
+        rqt_view_tolerance(c, p, &all);
+        /* Its depths, along the axis. */
+        const point forward = point_of(c->forward);
+        const long double cosine = inner(point_of(p->up), forward), sine = sqrtl(1 - cosine * cosine),
+                          reach = p->half_height * fabsl(cosine) + p->radius * sine,
+                          middle = inner(piece_from(p, c->eye).centre, forward), gap = reach / 2;
+        c->far = (double)(middle - reach - gap);
+        rqt_view_tolerance(c, p, &b);
+        CHECK(!b.shown && b.eps > gap * 0.999L, "beyond far: eps %g, gap %Lg", b.eps, gap);
+        c->far = (double)(middle * (1 + 1e-9L));
+        rqt_view_tolerance(c, p, &b);
+        CHECK(b.shown && b.eps == all.eps, "across far: eps %g of %g", b.eps, all.eps);
+        c->far = INFINITY;
+        c->near = (double)(middle + reach + gap);
+        rqt_view_tolerance(c, p, &b);
+        CHECK(!b.shown && b.eps > gap * 0.999L, "nearer than near: eps %g, gap %Lg", b.eps, gap);
+        c->near = all.distance / 2;
+        rqt_view_tolerance(c, p, &b);
+        CHECK(b.shown && b.eps == all.eps, "farther than near: eps %g of %g", b.eps, all.eps);
+        c->near = all.distance * 1.01;
+        if (c->near > middle) continue;
+        rqt_view_tolerance(c, p, &b);
+        CHECK(b.shown && fabs(b.eps - all.eps * 1.01) < b.eps * 1e-9, "across near: eps %g of %g", b.eps, all.eps);
+        within++;
+    }
+    CHECK(within > 100, "%d", within);
+}
+
 /* ---------------------------------------------------------------------------------------------- share -- */
 
 static void share_says_what_splitting_could_win(void **state) {
@@ -519,14 +562,14 @@ static void cameras_are_at_right_angles_and_upright(void **state) {
     random_begin(__func__);
     for (int n = 0; n < 3000; n++) {
         rqt_camera c = {.width = 640, .height = 480, .near = 0, .far = INFINITY, .tau = 1};
-        const double scale = random_between(0, 3) ? 1 : random_size(1e-150, 1e150);
+        const double scale = random_between(0, 3) ? 1 : pow(10, random_between(-300, 300));
         double eye[3], direction[3], vertical[3], ahead[3];
         set_doubles(eye, plus(NOWHERE, random_size(1, 1e9), random_direction()));
         const point d = random_direction();
         /* Now and then parallel, also to the one that does instead, also along an axis. */
         const int kind = random_between(0, 4);
         point v = random_direction(), a = random_direction();
-        if (kind == 0) v = plus(NOWHERE, random_between(0, 1) ? 1 : -1, d);
+        if (kind == 0) v = plus(plus(NOWHERE, random_between(0, 1) ? 1 : -1, d), random_size(1e-17, 1e-10), v);
         if (kind == 1) v = a = d;
         /* Nearly parallel: rounding must not cost the right angles. */
         if (kind == 2) v = unit_of(plus(d, random_size(2e-9, 1e-2), random_direction()));
@@ -650,6 +693,7 @@ int main(void) {
         TEST(F33_straight_down),
         TEST(F34_far_from_the_origin_nothing_is_lost),
         TEST(what_is_not_drawn_may_be_as_wrong_as_its_gap),
+        TEST(near_and_far_end_what_is_shown),
         TEST(share_says_what_splitting_could_win),
     };
     return cmocka_run_group_tests_name("views", tests, NULL, NULL);

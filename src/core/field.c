@@ -55,9 +55,16 @@ static bool exists(const rqt_lattice *lattice, rqt_square s) {
     return (s.x == 0 || s.x < lattice->width - 1) && (s.y == 0 || s.y < lattice->height - 1);
 }
 
+/* The largest float that is not above eps >= 0. */
 static float float_below(double eps) {
-    const float f = (float)eps;
-    return (double)f > eps ? (float)nextafter((double)f, 0) : f;
+    float f = (float)eps;
+    if ((double)f > eps) { /* so it is above 0: the float before has the bits before */
+        uint32_t bits;
+        memcpy(&bits, &f, sizeof bits);
+        bits--;
+        memcpy(&f, &bits, sizeof f);
+    }
+    return f;
 }
 
 static rqt_status make_node(making *m, size_t at, rqt_square s) {

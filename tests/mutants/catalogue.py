@@ -4,8 +4,9 @@ MUTANTS = [
     # heights and eps
     ("F1: planes tilt the wrong way in x", "src/core/deviation.c", "        if (a.y == box->y0) gy = -gy;\n", "",
      "test_failures_heights", "F1_constants_and_planes_are_two_triangles_at_eps_0"),
-    ("F1: a block is read where nothing is selected", "src/core/summary.c", "return summary->center_error > eps;",
-     "return summary->center_error >= eps;", "test_failures_heights", "F1_constants_and_planes_are_two_triangles_at_eps_0"),
+    ("F1: a block is read where nothing is selected", "src/core/query.c",
+     "return query->k > 0 && rqt_query_selects(query, centre, summary->center_error, summary->center_flags);",
+     "return query->k > 0;", "test_failures_heights", "F1_constants_and_planes_are_two_triangles_at_eps_0"),
     ("F3: only a triangle's first row counts", "src/core/deviation.c", "s.rows = last - first + 1;", "s.rows = 1;",
      "test_failures_heights", "F3_takagis_surface_is_within_eps_where_local_errors_miss_tents"),
     ("F4: minimal errors after one pass", "src/core/minimal.c", "} while (f.changed);", "} while (0);",
