@@ -94,7 +94,7 @@ static void bounds_are_the_papers_computed_by_hand(void **state) {
     p.side = RQT_VIEW_PATCH;
     assert_true(bound_of(RQT_VIEW_LODMAP, &c, &p).share == 1);
     p.side = 2 * RQT_VIEW_PATCH;
-    assert_true(bound_of(RQT_VIEW_LODMAP, &c, &p).share == 0);
+    assert_true(bound_of(RQT_VIEW_LODMAP, &c, &p).share == 0 && bound_of(RQT_VIEW_LODMAP, &c, &p).eps == 0);
 
     /* lindstrom, the least inside: at r = h = 95 it is 2 h; and straight ahead, where there is no height, r. */
     p = piece_at(0, 100, -100, 0, 5);

@@ -102,9 +102,10 @@ const char *rqt_view_test_name(rqt_view_test test);
 /* The metric whose errors the test is about. Only RQT_METRIC_EXACT is stored. */
 rqt_metric rqt_view_test_metric(rqt_view_test test);
 /* The bound of any test; of RQT_VIEW_GUARANTEED that of rqt_view_tolerance. For the others eps is infinite and
- * `shown` false where the prism misses the frustum; else eps is the least that the test allows in the piece, and
- * share is that over the most that it allows there. RQT_VIEW_LODMAP has the share 0 in squares larger than a patch,
- * which are not asked, and 1 in those that are not. eps may be 0 or infinite, never not a number. */
+ * `shown` false where the prism misses the frustum; else eps is what the test allows the piece, and share the least
+ * over the most that it allows its points. In RQT_VIEW_LODMAP squares larger than a patch get eps 0 and share 0,
+ * for they are to be split; patches and what is smaller have the share 1. eps may be 0 or infinite, never not a
+ * number. */
 void rqt_view_test_bound(rqt_view_test test, const rqt_camera *camera, const rqt_view_piece *piece,
                          rqt_view_bound *bound);
 

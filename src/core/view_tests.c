@@ -167,7 +167,7 @@ void rqt_view_test_bound(rqt_view_test test, const rqt_camera *camera, const rqt
         asked = sqrt(dot(s.to_centre, s.to_centre));
         break;
     case RQT_VIEW_LODMAP:
-        asked = by_direction(camera, s.to_centre);
+        asked = piece->side > RQT_VIEW_PATCH ? 0 : by_direction(camera, s.to_centre);
         length = piece->side > RQT_VIEW_PATCH ? (span){0, 1} : (span){1, 1};
         break;
     default: /* the sphere: the field of view over the picture's height, radians per pixel */
