@@ -32,12 +32,11 @@ void scene_free(scene *s);
 int scene_from_geocentric(const scene *s, double place[3], const char *what, char **error);
 /* Where x, y of the terrain's CRS and a height in metres are in the scene. `exaggeration`: of this height. */
 void scene_place(const scene *s, const double place[3], double exaggeration, double point[3]);
-/* East, north and up there: unit. In a projected system grid east and grid north. */
-void scene_axes(const scene *s, const double place[3], double east[3], double north[3], double up[3]);
-/* A piece of the scene that holds all samples of columns x0 .. x1, rows y0 .. y1 whose heights are
- * lowest .. highest (metres, not exaggerated). scene.c has the proof. */
-void scene_prism(const scene *s, int32_t x0, int32_t y0, int32_t x1, int32_t y1, double lowest, double highest,
-                 rqt_prism *prism);
+/* East and up there: unit; north is up x east. In a projected system grid east and grid north. */
+void scene_axes(const scene *s, const double place[3], double east[3], double up[3]);
+/* A piece of the scene that holds all samples of a square, as far as there is terrain, whose heights are lowest ..
+ * highest (metres, not exaggerated). scene.c has the proof. */
+void scene_piece(const scene *s, rqt_square square, double lowest, double highest, rqt_view_piece *piece);
 
 /* ----------------------------------------------------------------------------------------------- camera */
 typedef enum camera_position { CAMERA_CRS, CAMERA_LONLAT, CAMERA_ECEF } camera_position;

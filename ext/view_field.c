@@ -121,12 +121,13 @@ static int find_relief(builder *b, rqt_square square, int level) {
 
 /* How many vertices could be saved by cutting the square? A guess: errors fall by half from level to level, so with
  * the largest error e there are about (e/eps)^2, but not more than samples; with the best eps that a part could
- * have fewer (share 0: the eye may be in the square). */
+ * have fewer. Share 0: the eye may be in the square, or the test wants smaller ones. */
 static double worth_of(const builder *b, rqt_square square, int level, const rqt_view_bound *bound) {
+    if (bound->share == 0) return INFINITY;
     const int beneath = level - (b->terrain->lattice.K - b->terrain->k);
     const double error = rqt_code_metres(b->relief[level].error) * b->view->scene.exaggeration;
     const double all = square.side, ratio = ldexp(error, beneath > 0 ? -beneath : 0) / bound->eps;
-    const double now = fmin(ratio, all), then = bound->share > 0 ? fmin(ratio * bound->share, all) : 0;
+    const double now = fmin(ratio, all), then = fmin(ratio * bound->share, all);
     return now * now - then * then;
 }
 
@@ -139,12 +140,11 @@ static rqt_field_step decide(void *context, rqt_square square, double *eps) {
     while (square.side >> (lattice->K - level) > 1) level--;
     b->code = find_relief(b, square, level);
     if (b->code != SQLITE_OK) return RQT_FIELD_FAIL;
-    const rqt_vertex end = rqt_vertex_clamp(lattice, (rqt_vertex){square.x + square.side, square.y + square.side});
     const store_relief *relief = &b->relief[level];
-    rqt_prism prism;
+    rqt_view_piece piece;
     rqt_view_bound bound;
-    scene_prism(&v->scene, square.x, square.y, end.x, end.y, relief->lowest, relief->highest, &prism);
-    rqt_view_tolerance(&v->camera, &prism, &bound);
+    scene_piece(&v->scene, square, relief->lowest, relief->highest, &piece);
+    rqt_view_test_bound(v->test, &v->camera, &piece, &bound);
     if (square.side > 1 && worth_of(b, square, level, &bound) > WORTH_CUTTING) return RQT_FIELD_SPLIT;
     *eps = bound.eps / v->scene.exaggeration;
     if (!bound.shown || add_square(&b->shown, square)) return RQT_FIELD_LEAF;

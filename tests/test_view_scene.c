@@ -165,13 +165,32 @@ static void check_point(const rqt_prism *prism, const double p[3], double *spare
     *spare_height = fmin(*spare_height, prism->half_height - fabs(along));
 }
 
+/* Is it in the box? */
+static void check_box(const rqt_view_piece *piece, const double p[3]) {
+    const double *const up = piece->prism.up, *const e = piece->east;
+    const double north[3] = {up[1] * e[2] - up[2] * e[1], up[2] * e[0] - up[0] * e[2], up[0] * e[1] - up[1] * e[0]};
+    double east_by = 0, north_by = 0;
+    for (int i = 0; i < 3; i++) {
+        east_by += (p[i] - piece->prism.centre[i]) * e[i];
+        north_by += (p[i] - piece->prism.centre[i]) * north[i];
+    }
+    CHECK(fabs(east_by) <= piece->half_east && fabs(north_by) <= piece->half_north,
+          "a sample is %.9g east and %.9g north, the box %.9g and %.9g", east_by, north_by, piece->half_east,
+          piece->half_north);
+}
+
 /* The samples of a square that can be furthest out: its sides and some inside, at both ends of the heights. */
-static void check_square(const scene *s, int x0, int y0, int x1, int y1, double lowest, double highest) {
+static void check_square(const scene *s, rqt_square square, double lowest, double highest) {
     const store_terrain *t = s->terrain;
-    rqt_prism prism;
-    scene_prism(s, x0, y0, x1, y1, lowest, highest, &prism);
-    assert_true(fabs(prism.up[0] * prism.up[0] + prism.up[1] * prism.up[1] + prism.up[2] * prism.up[2] - 1) <
+    rqt_view_piece piece;
+    const rqt_prism *const prism = &piece.prism;
+    scene_piece(s, square, lowest, highest, &piece);
+    assert_int_equal(piece.side, square.side);
+    assert_true(fabs(prism->up[0] * prism->up[0] + prism->up[1] * prism->up[1] + prism->up[2] * prism->up[2] - 1) <
                 1e-12);
+    const int x0 = square.x, y0 = square.y, last = t->lattice.width - 1;
+    const int x1 = x0 + square.side < last ? x0 + square.side : last,
+              y1 = y0 + square.side < last ? y0 + square.side : last;
     double spare[2] = {INFINITY, INFINITY};
     for (int n = 0; n < 400; n++) {
         const int x = n < 4 ? (n & 1 ? x1 : x0) : n % 3 == 0 ? x0 : n % 3 == 1 ? x1 : dice_int(x0, x1);
@@ -186,14 +205,15 @@ static void check_square(const scene *s, int x0, int y0, int x1, int y1, double 
             textbook_ecef(s->ellipsoid.a, s->ellipsoid.f, p, q);
             memcpy(p, q, sizeof q);
         }
-        check_point(&prism, p, &spare[0], &spare[1]);
+        check_point(prism, p, &spare[0], &spare[1]);
+        check_box(&piece, p);
     }
     /* Not idle where the Earth is nearly flat: a few corners all but touch it. */
     const double degrees = fmax(fabs(t->placement.dx) * (x1 - x0), fabs(t->placement.dy) * (y1 - y0));
     if (s->geoid.most > 0 || (s->space && (degrees > 0.2 || fabs(t->placement.y0 + y0 * t->placement.dy) > 60)))
         return;
-    CHECK(spare[0] <= 0.08 * prism.radius && spare[1] <= 0.02 * prism.half_height + 40,
-          "a radius of %.9g has %.9g to spare, a height of %.9g %.9g", prism.radius, spare[0], prism.half_height,
+    CHECK(spare[0] <= 0.08 * prism->radius && spare[1] <= 0.02 * prism->half_height + 40,
+          "a radius of %.9g has %.9g to spare, a height of %.9g %.9g", prism->radius, spare[0], prism->half_height,
           spare[1]);
 }
 
@@ -226,8 +246,7 @@ static void samples_of_a_square_are_in_its_prism(void **state) {
         for (int square = 0; square < 12; square++) {
             const int side = 1 << dice_int(0, 8), x0 = dice_int(0, size - 2), y0 = dice_int(0, size - 2);
             const double lowest = dice(-11000, 9000);
-            check_square(&s, x0, y0, x0 + side < size ? x0 + side : size - 1,
-                         y0 + side < size ? y0 + side : size - 1, lowest, lowest + dice(0, 6000));
+            check_square(&s, (rqt_square){x0, y0, side}, lowest, lowest + dice(0, 6000));
         }
         scene_free(&s);
     }
