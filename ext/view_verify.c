@@ -92,18 +92,6 @@ static int code_of(verify_status status, char **error) {
                                     : SQLITE_OK;
 }
 
-static int judge_mesh(const evidence *e, proof *p, char **error) {
-    verify_free_triangle *t = sqlite3_malloc64((e->count + 1) * sizeof *t);
-    if (!t) return SQLITE_NOMEM;
-    for (size_t i = 0; i < 3 * e->count; i++) {
-        const verify_corner *c = &e->triangles[i / 3].corner[i % 3];
-        t[i / 3].corner[i % 3] = (verify_free_corner){c->col, c->row, c->q};
-    }
-    const verify_status status = verify_free_topology(t, e->count, &p->mesh);
-    sqlite3_free(t);
-    return code_of(status, error);
-}
-
 static int judge_rows(const request *r, const evidence *e, int32_t first, int32_t last, proof *p, char **error) {
     const view *v = r->view;
     const rqt_camera *c = &v->camera;
@@ -151,7 +139,7 @@ static int prove(request *r, proof *p, char **error) {
     const int32_t band = width < BAND_SAMPLES ? BAND_SAMPLES / width : 1;
     evidence e = {0};
     int code = take_triangles(r, &e, error);
-    if (code == SQLITE_OK) code = judge_mesh(&e, p, error);
+    if (code == SQLITE_OK) code = code_of(verify_topology(e.triangles, e.count, &p->mesh), error);
     for (int32_t row = 0; row < height && code == SQLITE_OK; row += band) {
         const int32_t last = height - row > band ? row + band - 1 : height - 1;
         if (!store_is_interrupted(r->store, &code)) code = judge_rows(r, &e, row, last, p, error);

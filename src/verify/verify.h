@@ -75,15 +75,19 @@ typedef enum verify_status {
  * Counter-clockwise seen from above: with rows growing south, corner a, b, c have
  * (bx-ax)*(cy-ay) - (cx-ax)*(by-ay) < 0.
  *
- * Memory: 8 bytes per sample of the window, and up to some 100 per triangle. Time: in step with the samples in all
+ * Memory: 8 bytes per sample of the window, and up to some 300 per triangle. Time: in step with the samples in all
  * triangles, plus the triangles whose boxes are alike in size and place. */
 verify_status verify_mesh(const verify_samples *samples, const verify_triangle *triangles, size_t n,
                           verify_report *report);
 
-/* The same for meshes whose vertices lie between samples, as clipping makes them. Places are doubles and taken at
- * their word: turning, overlaps, T-junctions and which samples a triangle covers are exact, and need all places to
- * be multiples of one power of two (below 2^53 of it; else VERIFY_INVALID). Heights are doubles, and so is what is
- * computed of them: a deviation counts less VERIFY_FREE_ROUNDING quanta, which is what rounding may make of a
+/* What is true of the triangles alone, and needs no window: vertices, triangles, t_junctions, overlaps and
+ * twice_area of the report; the rest of it is zeros. Memory: up to some 300 bytes per triangle. */
+verify_status verify_topology(const verify_triangle *triangles, size_t n, verify_report *report);
+
+/* verify_mesh for meshes whose vertices lie between samples, as clipping makes them. Places are doubles and taken
+ * at their word: turning, overlaps, T-junctions and which samples a triangle covers are exact, and need all places
+ * to be multiples of one power of two (below 2^53 of it; else VERIFY_INVALID). Heights are doubles, and so is what
+ * is computed of them: a deviation counts less VERIFY_FREE_ROUNDING quanta, which is what rounding may make of a
  * sample that lies on its plane. twice_area is rounded to whole cells, area is not. */
 typedef struct verify_free_corner {
     double col, row; /* sample coordinates, |col|, |row| < 2^21 */
@@ -99,10 +103,6 @@ typedef struct verify_free_triangle {
 /* As verify_mesh. Time: in step with the samples in all triangles and the cells along all edges. */
 verify_status verify_free_mesh(const verify_samples *samples, const verify_free_triangle *triangles, size_t n,
                                verify_report *report);
-/* What is true of the triangles alone, and needs no window: vertices, triangles, t_junctions, overlaps and
- * twice_area of the report; the rest of it is zeros. */
-verify_status verify_free_topology(const verify_free_triangle *triangles, size_t n, verify_report *report);
-
 /* ------------------------------------------------------------------------------------------------ views --
  * How far a mesh is from the samples in a picture. Each valid sample S in a closed triangle has its place on it, M:
  * the corners' places with the sample's weights among the corners. Where S or M is drawn, the distance of the two

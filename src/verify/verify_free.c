@@ -391,9 +391,11 @@ static verify_status measure_error(const free_mesh *m, verify_report *report) {
     return VERIFY_OK;
 }
 
-static verify_status judge(const verify_samples *samples, const verify_free_triangle *triangles, size_t n,
-                           bool has_samples, verify_report *report) {
-    if (triangles == NULL && n > 0) return VERIFY_INVALID;
+verify_status verify_free_mesh(const verify_samples *samples, const verify_free_triangle *triangles, size_t n,
+                               verify_report *report) {
+    if (samples == NULL || report == NULL) return VERIFY_INVALID;
+    memset(report, 0, sizeof *report);
+    if (!verify_samples_are_sound(samples) || (triangles == NULL && n > 0)) return VERIFY_INVALID;
     free_mesh m = {
         .samples = samples, .triangles = triangles, .n = n, .corner = malloc((n + 1) * sizeof *m.corner)};
     if (m.corner == NULL) return VERIFY_NO_MEMORY;
@@ -404,25 +406,8 @@ static verify_status judge(const verify_samples *samples, const verify_free_tria
         status = measure_cracks(&m, &found);
     }
     if (status == VERIFY_OK) status = measure_overlaps(&m, &found);
-    if (status == VERIFY_OK && has_samples) status = measure_error(&m, &found);
+    if (status == VERIFY_OK) status = measure_error(&m, &found);
     if (status == VERIFY_OK) *report = found;
     free(m.corner);
     return status;
-}
-
-verify_status verify_free_mesh(const verify_samples *samples, const verify_free_triangle *triangles, size_t n,
-                               verify_report *report) {
-    if (samples == NULL || report == NULL) return VERIFY_INVALID;
-    memset(report, 0, sizeof *report);
-    if (!verify_samples_are_sound(samples)) return VERIFY_INVALID;
-    return judge(samples, triangles, n, true, report);
-}
-
-verify_status verify_free_topology(const verify_free_triangle *triangles, size_t n, verify_report *report) {
-    /* A window without samples that holds all places there can be. */
-    const int32_t from = -VERIFY_CORNER_LIMIT, side = 2 * VERIFY_CORNER_LIMIT;
-    const verify_samples everywhere = {.col0 = from, .row0 = from, .width = side, .height = side};
-    if (report == NULL) return VERIFY_INVALID;
-    memset(report, 0, sizeof *report);
-    return judge(&everywhere, triangles, n, false, report);
 }
