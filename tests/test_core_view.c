@@ -166,6 +166,8 @@ static scene random_scene(whereabouts where, double fovy) {
     const point up = random_between(0, 1) ? (point){{0, 0, 1}} : random_direction(),
                 origin = plus(NOWHERE, random_between(0, 1) ? 0 : 1e7L * random_unit(), random_direction());
     set_doubles(p->up, up);
+    const double upright[] = {0, 1, 1, random_unit(), 1 - random_size(1e-9, 0.1)};
+    p->upright = upright[random_between(0, 4)];
     set_doubles(p->centre, origin);
     const piece ground = piece_from(p, (const double[3]){0, 0, 0});
 
@@ -209,8 +211,18 @@ static scene random_scene(whereabouts where, double fovy) {
 
 /* --------------------------------------------------------------------------------------- the promise -- */
 
+/* The direction that is nearest to one and makes an angle with up, or down, that a piece's meshes may differ in. */
+static point admitted(const rqt_prism *p, point direction) {
+    const point up = unit_of(point_of(p->up)), one = unit_of(direction);
+    const long double cosine = inner(one, up), sine = sqrtl(fmaxl(0, 1 - (long double)p->upright * p->upright));
+    if (fabsl(cosine) >= p->upright) return one;
+    return plus(plus(NOWHERE, copysignl(p->upright, cosine), up), sine, unit_of(plus(one, -cosine, up)));
+}
+
 /* The worst of a point S with M within eps, in units of tau. */
-static long double worst_of(const rqt_camera *c, point s, long double eps, int directions) {
+static long double worst_of(const scene *place, point s, long double eps, int directions) {
+    const rqt_camera *c = &place->camera;
+    const rqt_prism *ground = &place->prism;
     /* Worst on the screen: in the plane of the ray and the axis (any, where they are one), there and back. */
     const point along = unit_of(s), forward = point_of(c->forward),
                 across = plus(forward, -inner(forward, along), along), right = point_of(c->right),
@@ -218,20 +230,23 @@ static long double worst_of(const rqt_camera *c, point s, long double eps, int d
     long double worst = apart(c, s, s);
     for (int n = 0; n < directions; n++) {
         const long double turn = 6.283185307179586477L * n / directions;
-        const point m = plus(plus(s, eps * cosl(turn), back), eps * sinl(turn), along);
-        worst = fmaxl(worst, apart(c, s, m));
+        const point way = plus(plus(NOWHERE, cosl(turn), back), sinl(turn), along);
+        worst = fmaxl(worst, apart(c, s, plus(s, eps, admitted(ground, way))));
     }
     /* The tangents from the eye to the ball around S. */
     const long double distance = size_of(s);
     if (eps < distance) {
         const long double sine = eps / distance, cosine = sqrtl(1 - sine * sine);
         for (int sign = -1; sign <= 1; sign += 2)
-            worst = fmaxl(worst, apart(c, s, plus(plus(s, sign * eps * cosine, back), -eps * sine, along)));
+            worst = fmaxl(
+                worst,
+                apart(c, s,
+                      plus(s, eps, admitted(ground, plus(plus(NOWHERE, sign * cosine, back), -sine, along)))));
     }
     /* Into what is drawn, as far as it goes. */
     const point target = nearest_drawn(c, s), way = plus(target, -1, s);
     const long double length = size_of(way);
-    if (length > 0) worst = fmaxl(worst, apart(c, s, length <= eps ? target : plus(s, eps / length, way)));
+    if (length > 0) worst = fmaxl(worst, apart(c, s, plus(s, fminl(length, eps), admitted(ground, way))));
     return worst;
 }
 
@@ -262,10 +277,10 @@ static void keep_promise(const scene *s, int samples, tally *t) {
     for (int n = 0; n < samples; n++) {
         const point p = sample(s, n);
         CHECK(size_of(p) >= b.distance, "sample %d is nearer than %g", n, b.distance);
-        long double worst = worst_of(c, p, b.eps, 8);
+        long double worst = worst_of(s, p, b.eps, 8);
         for (int m = 0; m < 4; m++) {
             const long double length = random_between(0, 1) ? 1 : random_unit();
-            worst = fmaxl(worst, apart(c, p, plus(p, b.eps * length, random_direction())));
+            worst = fmaxl(worst, apart(c, p, plus(p, b.eps * length, admitted(&s->prism, random_direction()))));
         }
         CHECK(b.shown || worst == 0, "sample %d: something is drawn, and the piece is not shown (eps %g)", n,
               b.eps);
@@ -384,7 +399,7 @@ static double best_by_search(const scene *s, double from) {
     for (int step = 0; step < 60 && most > least * 1.0005L; step++) {
         const long double eps = isinf(most) ? least * 2 : sqrtl(least * most);
         long double worst = 0;
-        for (int n = 0; n < 24 && worst <= 1; n++) worst = worst_of(&s->camera, points[n], eps, 24);
+        for (int n = 0; n < 24 && worst <= 1; n++) worst = worst_of(s, points[n], eps, 24);
         if (worst <= 1)
             least = eps;
         else
@@ -469,6 +484,31 @@ static void what_is_not_drawn_may_be_as_wrong_as_its_gap(void **state) {
           count, share[count / 2], share[count / 10]);
 }
 
+static void looking_down_on_upright_differences_allows_more(void **state) {
+    (void)state;
+    random_begin(__func__);
+    double share[PIECES];
+    for (int n = 0; n < PIECES; n++) {
+        scene s = piece_in_view(60, 0);
+        const piece ground = piece_from(&s.prism, s.camera.eye);
+        const long double cosine = fabsl(inner(unit_of(ground.centre), ground.up)),
+                          sine = sqrtl(1 - cosine * cosine);
+        rqt_view_bound any, up;
+        rqt_view_tolerance(&s.camera, &s.prism, &any);
+        s.prism.upright = 1;
+        rqt_view_tolerance(&s.camera, &s.prism, &up);
+        /* As the sine of the angle, give or take what the piece is wide. */
+        CHECK(up.eps >= any.eps && up.eps * (sine - 0.06L) <= any.eps &&
+                  (sine > 0.94L || up.eps * (sine + 0.06L) > any.eps),
+              "%g, %g, sine %Lg", any.eps, up.eps, sine);
+        share[n] = up.eps / best_by_search(&s, up.eps);
+    }
+    qsort(share, PIECES, sizeof *share, by_size);
+    print_message("differing upward and downward: eps is %.3f of the best possible (median; least %.3f)\n",
+                  share[PIECES / 2], share[0]);
+    CHECK(share[PIECES / 2] > 0.8, "median %g", share[PIECES / 2]);
+}
+
 static void near_and_far_end_what_is_shown(void **state) {
     (void)state;
     random_begin(__func__);
@@ -551,6 +591,7 @@ static void share_says_what_splitting_could_win(void **state) {
     rqt_view_tolerance(&s.camera, &s.prism, &b);
     CHECK(!b.shown && b.share == 1, "beside the picture: %g", b.share);
     s.prism.radius *= 10;
+    s.prism.half_height = s.prism.radius;
     rqt_view_tolerance(&s.camera, &s.prism, &b);
     CHECK(b.shown && b.share < 0.01, "across its border: %g", b.share);
 }
@@ -693,6 +734,7 @@ int main(void) {
         TEST(F33_straight_down),
         TEST(F34_far_from_the_origin_nothing_is_lost),
         TEST(what_is_not_drawn_may_be_as_wrong_as_its_gap),
+        TEST(looking_down_on_upright_differences_allows_more),
         TEST(near_and_far_end_what_is_shown),
         TEST(share_says_what_splitting_could_win),
     };

@@ -49,6 +49,9 @@ bool rqt_camera_project(const rqt_camera *camera, const double point[3], double 
 typedef struct rqt_prism {
     double centre[3], up[3]; /* up: unit */
     double radius, half_height;
+    double upright; /* the least cosine of the angle between the line along which a mesh differs from a sample and
+                       up: 1 where heights are counted along up (eps is then larger where one looks down on the
+                       piece), 0: in any direction, which is always safe */
 } rqt_prism;
 
 /* What the tolerance allows the terrain whose samples are all in a piece. */
@@ -56,18 +59,19 @@ typedef struct rqt_view_bound {
     double eps;      /* metres of the scene: how far the mesh may be from a sample there; never not a number */
     bool shown;      /* false: nothing of the terrain there, nor of a mesh within eps of it, is drawn */
     double distance; /* a lower bound of how far the samples are from the eye */
-    double share;    /* 0 .. 1: eps over the most that any part of the piece could get. What is less than 1 was lost
-                        to the piece's being large: against its distance, sideways or upward, across the frustum's
-                        border, or in its angle to the axis. Well below 1 it is worth splitting; at 1 nothing is to
-                        be won. Where nothing is shown: over the most that could be of use, what drawn pieces as far
-                        away as its farthest point have. 0 around an eye, whatever the size: stop somewhere. */
+    double
+        share; /* 0 .. 1: eps over the most that any part of the piece could get. What is less than 1 was lost
+                  to the piece's being large: against its distance, sideways or upward, across the frustum's
+                  border, or in its angles to the axis and to up. Well below 1 it is worth splitting; at 1 nothing
+                  is to be won. Where nothing is shown: over the most that could be of use, what drawn pieces as far
+                  away as its farthest point have. 0 around an eye, whatever the size: stop somewhere. */
 } rqt_view_bound;
 
 /* The guaranteed test. For every point S of the piece and every point M of a mesh with |S - M| <= eps, in any
- * direction: when S or M is drawn (near .. far, inside the picture), their places in the picture (of the infinite
- * picture plane; both have a depth > 0) are at most tau apart. Where nothing is drawn eps says how far M has to
- * stay from the frustum: it is finite, but large beside what is drawn. Of use are cameras of rqt_camera_look;
- * numbers that are not finite, or too large to be squared, give eps 0. */
+ * direction that `upright` admits: when S or M is drawn (near .. far, inside the picture), their places in the
+ * picture (of the infinite picture plane; both have a depth > 0) are at most tau apart. Where nothing is drawn eps
+ * says how far M has to stay from the frustum: it is finite, but large beside what is drawn. Of use are cameras of
+ * rqt_camera_look; numbers that are not finite, or too large to be squared, give eps 0. */
 void rqt_view_tolerance(const rqt_camera *camera, const rqt_prism *prism, rqt_view_bound *bound);
 
 /* ---------------------------------------------------------------------------------------------- other tests --

@@ -67,13 +67,14 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     if (length > 0 && isfinite(length))
         for (int c = 0; c < 3; c++) prism.up[c] /= length;
     if (take_between(&in, 0, 7) == 0) prism.radius = -prism.radius;
+    prism.upright = take_between(&in, 0, 1) ? take_between(&in, 0, 8) / 8.0 : take_double(&in);
     rqt_view_bound b;
     rqt_view_tolerance(&camera, &prism, &b);
     HOLD(b.eps >= 0 && isfinite(b.eps), "eps %g", b.eps);
     HOLD(b.distance >= 0 && isfinite(b.distance), "distance %g", b.distance);
     HOLD(b.share >= 0 && b.share <= 1, "share %g", b.share);
     /* The piece's middle, and what is eps above it. */
-    if (!sound || !(prism.radius >= 0) || !(length > 0)) return 0;
+    if (!sound || !(prism.radius >= 0) || !(length > 0) || !(prism.upright <= 1)) return 0;
     bool drawn = rqt_camera_project(&camera, prism.centre, xy);
     HOLD(!drawn || b.shown, "the middle is drawn, the piece is not shown");
     double above[3], there[2];
