@@ -38,4 +38,6 @@ MUTANTS = [
      "if (!bound.shown || bound.distance < 30 || add_square", "test_sql_view_proof.py", "voids: 67 cameras"),
     ("view: all of the ground is part of the answer", "ext/view_field.c", "if (!bound.shown || add_square",
      "if (add_square", "test_sql_view_proof.py", "no block is read that lies beside the picture"),
+    ("view: outlines of voids stay where they are", "ext/scene.c", "s->terrain->voids == 0;", "1;", "test_sql_view_proof.py",
+     "F33_straight_down_whichever_way_is_up"),
 ]
