@@ -40,4 +40,6 @@ MUTANTS = [
      "if (add_square", "test_sql_view_proof.py", "no block is read that lies beside the picture"),
     ("view: outlines of voids stay where they are", "ext/scene.c", "s->terrain->voids == 0;", "1;", "test_sql_view_proof.py",
      "F33_straight_down_whichever_way_is_up"),
+    ("view: a large square is in a small one at its corner", "ext/view_field.c", "inner.side <= outer.side && ", "",
+     "test_sql_view_proof.py", "F32_fields_of_view_from_a_hundredth_to_170_degrees"),
 ]
