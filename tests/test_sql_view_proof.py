@@ -53,16 +53,6 @@ for kind, ratio in sorted(worst.items(), key=lambda item: item[1]):
     print("  %-18s worst displacement %.4f of tau" % (kind, ratio))
 check("the worst displacement is near tau", max(worst.values()) > 0.9, max(worst.values()))
 
-# The proof can fail: the tests of the literature keep their meshes whole, but not the tolerance, and do not say that they do.
-t, dice, broken, claims = terrains["projected"], s.Dice(SEED + 5), {}, []
-shots = [dict(kind(t, dice), width=1280, height=800, tau=1) for kind in (v.widest_lens, v.exaggerated, v.inside_a_box, v.straight_down, v.overlook)]
-for test in ("ulrich", "node", "sphere", "lindstrom", "lodmap"):
-    seen = [v.prove(t.db, camera, {"test": test}) for camera in shots]
-    broken[test] = max(r["ratio"] for r in seen)
-    claims += [(test, r) for r in seen if r["guaranteed"] != 0 or r["t_junctions"] or r["overlaps"]]
-check("every test of the literature is seen to break the tolerance", min(broken.values()) > 1, broken)
-equal("and claims nothing, but closed meshes", claims[:1], [])
-
 # ------------------------------------------------------------------------------------------------- the catalogue's cases
 HARD = (v.below_ground, v.on_a_vertex, v.beside_a_vertex, v.inside_a_box, v.at_infinity)
 dice, bad, strange = s.Dice(SEED + 1), [], []
@@ -135,6 +125,17 @@ def furthest(other):
 
 check("F34_vertices_of_a_mesh_are_doubles_so_that_the_eye_can_be_taken_from_them_before_single_precision",
       points == set(view) and furthest(by_eye) < 0.001 and furthest(naive) > 2, (len(points), len(view), furthest(by_eye), furthest(naive)))
+
+# --------------------------------------------------------------------------------------------------- the other tests
+# The proof can fail: the tests of the literature keep their meshes whole, but not the tolerance, and do not say that they do.
+t, dice, broken, claims = terrains["projected"], s.Dice(6), {}, []
+shots = [dict(kind(t, dice), width=1280, height=800, tau=1) for kind in (v.widest_lens, v.exaggerated, v.inside_a_box, v.straight_down, v.overlook)]
+for test in ("ulrich", "node", "sphere", "lindstrom", "lodmap"):
+    seen = [v.prove(t.db, camera, {"test": test}) for camera in shots]
+    broken[test] = max(r["ratio"] for r in seen)
+    claims += [(test, r) for r in seen if r["guaranteed"] != 0 or r["t_junctions"] or r["overlaps"]]
+check("every test of the literature is seen to break the tolerance", min(broken.values()) > 1, broken)
+equal("and claims nothing, but closed meshes", claims[:1], [])
 
 # ------------------------------------------------------------------------------------------------------- what is read
 # No bytes of a block that lies wholly beside the picture: blocks are read for what may be drawn, and closure needs no others.

@@ -32,7 +32,7 @@ MUTANTS = [
     ("view: the Earth is flat", "ext/frame.c", "if (code == SQLITE_OK) code = lower_eps(r, f, error);", "(void)lower_eps;",
      "test_sql_view_proof.py", "F33_straight_down_whichever_way_is_up"),
     ("mesh formats: places in single precision", "src/core/mesh_format.c", "put_double(bytes + AT_PLACEMENT, f->placement.x0);",
-     "put_double(bytes + AT_PLACEMENT, (float)(f->placement.x0 / 7) * 7);", "test_sql_view_proof.py",
+     "put_double(bytes + AT_PLACEMENT, (double)(float)(f->placement.x0 / 7) * 7);", "test_sql_view_proof.py",
      "F34_vertices_of_a_mesh_are_doubles_so_that_the_eye_can_be_taken_from_them_before_single_precision"),
     ("view: ground that the eye is above is no part of the answer", "ext/view_field.c", "if (!bound.shown || add_square",
      "if (!bound.shown || bound.distance < 30 || add_square", "test_sql_view_proof.py", "voids: 67 cameras"),
