@@ -177,6 +177,12 @@ verify-data: ## rqt_verify over every DEM of DATA=dir at nine eps
 	@$(MAKE) --no-print-directory -j2 products
 	@BUILD=$(BUILD) ./tests/bench/verify_data.sh $(DATA)
 
+.PHONY: verify-views
+verify-views: ## rqt_view_verify over 200 cameras on every DEM of DATA=dir, and every test of options.test: tables
+	@./src/install-packages.sh build test
+	@$(MAKE) --no-print-directory -j2 products
+	@RQT=$(BUILD)/rqt RQT_SO=$(BUILD)/rqt.so /usr/bin/python3 tests/bench/verify_views.py $(DATA)
+
 .PHONY: check-layers
 check-layers: ## modules depend one way only; librqt.a and rqt.so mention only what they may
 	@./src/install-packages.sh build test

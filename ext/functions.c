@@ -111,6 +111,21 @@ const function rqt_functions[] = {
      .example = "SELECT max_error <= 10, t_junctions, overlaps, uncovered FROM rqt_verify(" SUMMIT ", 10)",
      .fill = fill_verify,
      .hidden = "void_touched, twice_area_in_cells, half_cells, achieved_eps"},
+    {.name = "rqt_view_verify",
+     .arguments = "camera [, terrain [, options]]",
+     .returns = "samples, drawn, vertices, triangles, max_pixels, rms_pixels, x, y, z, t_junctions, overlaps",
+     .purpose =
+         "Proves the mesh of a view: projects every full-resolution sample of the terrain and the mesh's place "
+         "that "
+         "belongs to it. max_pixels: the largest distance of the two in the picture where one of them is drawn, at "
+         "x, y, z; infinite where the other is behind the eye. uncovered: samples that are drawn, in no triangle, "
+         "and further from voids than what achieved_tau pixels are there.",
+     .example =
+         "SELECT max_pixels <= 1, t_junctions, overlaps, uncovered, guaranteed FROM rqt_view_verify("
+         "'{\"eye\": [-71.33, 44.22, 2500], \"at\": [-71.3033, 44.2705, 1900], \"fovy\": 40, \"width\": 1280, "
+         "\"height\": 800}')",
+     .fill = fill_view_verify,
+     .hidden = "achieved_tau, guaranteed, uncovered"},
     {.name = "rqt_explain",
      .arguments = MESH,
      .returns = "level, extent, why, bytes, cached, selected",

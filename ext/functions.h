@@ -183,6 +183,7 @@ fill_rows fill_view, fill_view_triangles, fill_view_strip;                 /* me
 fill_rows fill_profile, fill_area;                                         /* profile.c, area.c */
 fill_rows fill_view_explain;                                               /* insight_tables.c */
 fill_rows fill_terrains, fill_explain, fill_verify, fill_check, fill_help; /* insight_tables.c, verify_table.c */
+fill_rows fill_view_verify;                                                /* view_verify.c */
 scalar_call call_version, call_build_info, call_mesh, call_view_mesh, call_height; /* scalar.c */
 scalar_call call_block_info, call_block_check, call_block_dump;                    /* block_functions.c */
 scalar_call call_bbox, call_circle, call_corridor;                                 /* shapes.c */

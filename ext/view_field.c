@@ -48,7 +48,7 @@ typedef struct builder {
 /* --------------------------------------------------------------------------------------------- what is seen -- */
 
 static bool is_in(rqt_square inner, rqt_square outer) {
-    return inner.x >= outer.x && inner.y >= outer.y && inner.x < outer.x + outer.side &&
+    return inner.side <= outer.side && inner.x >= outer.x && inner.y >= outer.y && inner.x < outer.x + outer.side &&
            inner.y < outer.y + outer.side;
 }
 
