@@ -215,7 +215,7 @@ check-docs: ## fail when ext/SQL.md, the README's session or the list of fuzzers
 	@./tests/check_fuzz.sh
 
 # ---------------------------------------------------------------------------------------------------- benches
-.PHONY: bench bench-data bench-update bench-table1 chart peers
+.PHONY: bench bench-data bench-update bench-table1 bench-views chart chart-views peers
 bench: ## speed and size beside GDAL's, medians of five and more
 	@./src/install-packages.sh build test
 	@$(MAKE) --no-print-directory -j2 products
@@ -233,6 +233,12 @@ bench-table1: ## share of vertices over eps beside the paper's table 1
 	@./src/install-packages.sh build test
 	@$(MAKE) --no-print-directory -j2 products
 	@BUILD=$(BUILD) ./tests/bench/bench_table1.sh
+
+bench-views: ## what views cost: one megapixel, fly-overs, ETOPO5 over a network, beside the papers' figures
+	@./src/install-packages.sh build test
+	@./src/install-packages.sh views || echo "No ETOPO5: the table goes without" >&2
+	@$(MAKE) --no-print-directory -j2 products
+	@BUILD=$(BUILD) ./tests/bench/bench_views.sh
 
 # What published methods give on the catalogue's inputs (tests/catalogue.txt), beside rqt.
 .PHONY: stability check-stability
@@ -258,6 +264,10 @@ chart: ## speed against accuracy, drawn: pictures in build/chart; peers from npm
 	@./src/install-packages.sh peers || echo "No node: the charts go without peers" >&2
 	@$(MAKE) --no-print-directory -j2 products
 	@BUILD=$(BUILD) DATA="$(if $(filter command% environment%,$(origin DATA)),$(DATA))" DOCS=$(DOCS) ./tests/bench/chart.sh
+chart-views: ## views by the guaranteed test beside those of the literature, drawn: pictures in build/chart; DATA=dir
+	@./src/install-packages.sh build test
+	@$(MAKE) --no-print-directory -j2 products
+	@BUILD=$(BUILD) DATA="$(if $(filter command% environment%,$(origin DATA)),$(DATA))" DOCS=$(DOCS) ./tests/bench/chart_views.sh
 peers: ## vertices at equal true error beside a greedy TIN and RTIN, for six DEMs of DATA=dir
 	@./src/install-packages.sh build test
 	@./src/install-packages.sh peers || echo "No node: the table goes without peers" >&2

@@ -42,7 +42,6 @@ int view_place(request *r, char **error) {
     int code = check_options(r, error);
     const bool geoid = r->frame_kind != FRAME_CRS && terrain_is_above_geoid(r->terrain);
     v->test = r->test;
-    v->guaranteed = v->test == RQT_VIEW_GUARANTEED;
     if (code == SQLITE_OK) code = scene_create(&v->scene, r->terrain, v->words.exaggeration, geoid, error);
     if (code == SQLITE_OK) code = camera_make(r->connection, &v->scene, &v->words, &v->camera, error);
     return code;

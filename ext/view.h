@@ -1,12 +1,12 @@
 /* view.h - views: from a camera in JSON to a request that the mesh functions answer like any other.
  *
  *   camera.c      the JSON, and the camera that it makes in a scene
- *   scene.c       the scene of a terrain: where its samples are in space, and pieces of space that hold squares of
- * it view_field.c  scene and camera -> an eps for every square of ground (rqt_field), and the squares that may be
- * seen view.c        all of it, as a request: region = what may be seen, eps = infinity, rule = the field
+ *   scene.c       where samples are in space, and pieces of space that hold squares
+ *   view_field.c  scene and camera -> an eps for every square, and what may be seen
+ *   view.c        all of it, as a request: region, eps infinite, the field as rule
  *   budget.c      the best view within a number of triangles
  *   token.c       what one answer tells the next of itself
- *   follow.c      views that follow a camera: what stays, and what turns one mesh into the next
+ *   follow.c      views that follow a camera: what stays, and what changes a mesh
  */
 #ifndef RQT_EXT_VIEW_H
 #define RQT_EXT_VIEW_H
@@ -86,7 +86,7 @@ struct view {
     rqt_view_test test;
     rqt_field *field;
     double achieved_tau; /* pixels: camera.tau, or more to keep within max_triangles */
-    bool guaranteed;
+    bool guaranteed;     /* the tolerance holds for the source's samples, too; view_field sets it */
     /* Of option previous; follow.c. */
     bool has_band;
     rqt_view_band band; /* the answer is right for all cameras of it */
