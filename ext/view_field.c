@@ -13,9 +13,10 @@
 #include <math.h>
 #include <string.h>
 
-/* Vertices: with half of one, meshes have about 5 % more of them than with squares as small as can be, for four to
- * ten thousand squares. */
-#define WORTH_CUTTING 1.0
+/* Vertices. A square costs as much time as three or four of them. In one megapixel views of 4097^2 samples meshes
+ * have 3 to 10 % more vertices with 4 than with 1, for a third of the squares; 8 adds 2 to 9 % more, and 1 has 1 to
+ * 4 % more than a quarter. */
+#define WORTH_CUTTING 4.0
 
 #define BAND_PRICE 1.2 /* what a band takes of the best anyway, and cutting does not give back */
 
@@ -139,9 +140,9 @@ static int find_relief(builder *b, rqt_square square, int level) {
     const store_terrain *t = b->terrain;
     rqt_block_place place;
     b->relief[level] = level == 0 ? store_relief_of_all(t) : b->relief[level - 1];
+    if (level > t->lattice.K - t->k) return SQLITE_OK;
     const rqt_block_number number = rqt_block_number_of(level, square.x / square.side, square.y / square.side);
-    if (level > t->lattice.K - t->k || rqt_block_locate(&t->lattice, t->k, number, &place) != RQT_OK)
-        return SQLITE_OK;
+    if (rqt_block_locate(&t->lattice, t->k, number, &place) != RQT_OK) return SQLITE_OK;
     return store_find_relief(b->store, t, number, &b->relief[level], b->error);
 }
 
@@ -160,9 +161,7 @@ static double worth_of(const builder *b, rqt_square square, int level, const rqt
 /* The piece of the scene that holds a square's samples. */
 static int find_piece(builder *b, rqt_square square, int *level, rqt_view_piece *piece) {
     if (++b->asked % ASKED_AT_A_TIME == 0 && store_is_interrupted(b->store, &b->code)) return b->code;
-    const rqt_lattice *lattice = &b->terrain->lattice;
-    *level = lattice->K;
-    while (square.side >> (lattice->K - *level) > 1) --*level;
+    *level = b->terrain->lattice.K - __builtin_ctz((unsigned)square.side);
     b->code = find_relief(b, square, *level);
     if (b->code != SQLITE_OK) return b->code;
     const store_relief *relief = &b->relief[*level];

@@ -1,6 +1,5 @@
 /* test_core_field.c - an eps for every square of a field: the tree of squares, and what rules make of it, against
- * the definitions of test_core_trial.h; and the thresholds that are painted for a block, against those that are
- * asked for. */
+ * the definitions of test_core_trial.h; and what is chosen in a block, against what is asked for one by one. */
 #include "rule.h"
 
 #include "test_core_trial.h"
@@ -240,10 +239,71 @@ static rqt_field_step scatter(void *context, rqt_square s, double *eps) {
     return RQT_FIELD_LEAF;
 }
 
-static void painted_limits_are_the_thresholds_that_are_asked_for(void **state) {
+static bool is_corner(int across, int u, int v) {
+    return (u == 0 || u == across - 1) && (v == 0 || v == across - 1);
+}
+
+/* Errors that just do, or just do not, select: what is selected is closed, and whatever is done with a threshold
+ * that is off by one shows. Parents before their children: a vertex between two of a coarser grid, and a centre
+ * between four, depend on those of its parents that are in the block. kinds: of thresholds, below 0, of no bound
+ * and others; of vertices whose parents are selected, so that they are what is asked: not selected, selected. */
+static void draw_errors(rqt_block *b, const rqt_block_place *p, const rqt_rule *rule, int share,
+                        size_t kinds[3][2]) {
+    const int across = (1 << b->k) + 1;
+    for (int q = across / 2; q > 0; q /= 2)
+        for (int is_side = 0; is_side < 2; is_side++)
+            for (int i = 0; i < across * across; i++) {
+                const int u = i % across, v = i / across;
+                const bool odd_u = u / q % 2 == 1, odd_v = v / q % 2 == 1;
+                if (u % q || v % q || (is_side ? odd_u == odd_v : !odd_u || !odd_v)) continue;
+                /* A side's parents are the centres beside it; those of a centre q away from it are the two corners
+                 * of its cell that are not the centre of the next larger cell, nor across from that. */
+                static const int beside[4][2] = {{-1, 0}, {1, 0}, {0, -1}, {0, 1}};
+                bool has_parents = true;
+                for (int n = 0; n < 4; n++) {
+                    int x = u + beside[n][0] * q, y = v + beside[n][1] * q;
+                    if (is_side) {
+                        if (x / q % 2 == 0 || y / q % 2 == 0) continue;
+                    } else {
+                        x = u + (n & 1 ? q : -q), y = v + (n & 2 ? q : -q);
+                        if (x / q / 2 % 2 == y / q / 2 % 2) continue;
+                    }
+                    if (x < 0 || y < 0 || x >= across || y >= across || is_corner(across, x, y)) continue;
+                    has_parents &= (b->flags[y * across + x] & RQT_VALID) != 0;
+                }
+                const int32_t least =
+                    rqt_rule_threshold(rule, (rqt_vertex){p->x + u * p->stride, p->y + v * p->stride});
+                const bool selected = least < 0 || (has_parents && random_between(0, 99) < share);
+                b->error[i] = (rqt_code)(least < 0 ? 0 : selected ? least + 1 : least);
+                b->flags[i] = selected ? RQT_VALID : 0; /* for now: which ones are selected */
+                if (has_parents) kinds[least < 0 ? 0 : least == RQT_CODE_LARGEST ? 1 : 2][selected]++;
+            }
+}
+
+static void check_chosen(rqt_block *b, const rqt_block_place *p, const rqt_rule *rule) {
+    const int across = (1 << b->k) + 1;
+    uint8_t *chosen = malloc((size_t)(across * across)); /* exactly: the sanitizer sees what is written past it */
+    if (!chosen) abort();
+    const int odd = random_between(0, across * across - 1);
+    for (int i = 0; i < across * across; i++) b->flags[i] = i == odd ? 0 : RQT_VALID;
+    const uint8_t all = rule_choose(rule, p, b, 0, chosen);
+    for (int i = 0; i < across * across; i++) {
+        const int u = i % across, v = i / across;
+        const rqt_vertex at = {p->x + u * p->stride, p->y + v * p->stride};
+        const bool want = !is_corner(across, u, v) && rqt_rule_selects(rule, at, b->error[i], false);
+        CHECK(chosen[i] == want,
+              "K %d, k %d, block at (%d,%d), stride %d, vertex (%d,%d), threshold %d, error %d: %s",
+              rule_lattice(rule)->K, b->k, p->x, p->y, p->stride, u, v, rqt_rule_threshold(rule, at), b->error[i],
+              want ? "not chosen" : "chosen");
+    }
+    assert_int_equal(all & RQT_VALID, chosen[odd] ? 0 : RQT_VALID);
+    free(chosen);
+}
+
+static void what_is_chosen_in_a_block_is_what_rules_select(void **state) {
     (void)state;
-    random_begin("limits");
-    size_t all = 0, kinds[3] = {0};
+    random_begin("chosen");
+    size_t kinds[3][2] = {{0}};
     for (int n = 0; n < 60; n++) {
         rqt_lattice lattice;
         rqt_field *field;
@@ -267,37 +327,26 @@ static void painted_limits_are_the_thresholds_that_are_asked_for(void **state) {
         }
         for (int time = 0; time < 8; time++) {
             const int k = random_between(0, lattice.K < RQT_MAX_BLOCK_K ? lattice.K : RQT_MAX_BLOCK_K),
-                      level = random_between(0, lattice.K - k), across = (1 << k) + 1;
+                      level = random_between(0, lattice.K - k);
             rqt_block_place p;
             if (rqt_block_locate(&lattice, k,
                                  rqt_block_number_of(level, random_between(0, (1 << level) - 1),
                                                      random_between(0, (1 << level) - 1)),
                                  &p) != RQT_OK)
                 continue;
-            /* exactly the room there is: the sanitizer sees what is written past it */
-            uint16_t *limits = calloc((size_t)(across * across), sizeof *limits),
-                     *room = malloc(rule_limits_room(k) * sizeof *room);
-            if (!limits || !room) abort();
-            rule_limits(rule, &p, k, limits, room);
-            for (int i = 0; i < across * across; i++) {
-                const int u = i % across, v = i / across;
-                if ((u == 0 || u == across - 1) && (v == 0 || v == across - 1)) continue;
-                const rqt_vertex at = {p.x + u * p.stride, p.y + v * p.stride};
-                const int32_t want = rqt_rule_threshold(rule, at);
-                CHECK(limits[i] == want + 1,
-                      "K %d, k %d, block at (%d,%d), stride %d, vertex (%d,%d): %d, should be %d", lattice.K, k,
-                      p.x, p.y, p.stride, u, v, limits[i], want + 1);
-                all++;
-                kinds[want < 0 ? 0 : want == RQT_CODE_LARGEST ? 1 : 2]++;
-            }
-            free(limits);
-            free(room);
+            rqt_block b;
+            assert_int_equal(rqt_block_create(k, &test_allocator, &b), RQT_OK);
+            draw_errors(&b, &p, rule, random_between(80, 100), kinds);
+            check_chosen(&b, &p, rule);
+            rqt_block_free(&b, &test_allocator);
         }
         rqt_rule_free(rule);
         rqt_field_free(field);
     }
-    CHECK(all > 100000 && kinds[0] > 100 && kinds[1] > 100 && kinds[2] > 10000,
-          "%zu vertices: %zu below 0, %zu of no bound, %zu others", all, kinds[0], kinds[1], kinds[2]);
+    for (int kind = 0; kind < 3; kind++)
+        CHECK(kinds[kind][1] > 100 && (kind == 0 || kinds[kind][0] > 100),
+              "%zu vertices selected, %zu not, of kind %d", kinds[kind][1], kinds[kind][0], kind);
+    CHECK(kinds[2][1] > 20000, "%zu vertices selected", kinds[2][1]);
 }
 
 /* Every request for memory refused, once and from then on: a field, and a query with it. */
@@ -356,7 +405,7 @@ int main(void) {
         TEST(squares_come_in_order_and_boxes_find_the_least),
         TEST(a_scaled_eps_is_rounded_down),
         TEST(bad_answers_and_fields_are_refused),
-        TEST(painted_limits_are_the_thresholds_that_are_asked_for),
+        TEST(what_is_chosen_in_a_block_is_what_rules_select),
         TEST(without_memory_nothing_is_lost),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -5,7 +5,7 @@
 
 #pragma push_macro("fail") /* cmocka's; ext has a function of that name */
 #undef fail
-#include "view.h"
+#include "../ext/view.h"
 #pragma pop_macro("fail")
 
 static uint64_t seed = 5, dice_state;

@@ -17,6 +17,8 @@
 
 enum { ABSENT, LEAF, SPLIT };
 
+#define NOWHERE 1 /* the node of all that is outside the root */
+
 typedef struct node {
     union {
         float eps;      /* LEAF: as it was told */
@@ -30,7 +32,7 @@ typedef struct node {
 struct rqt_field {
     rqt_lattice lattice;
     rqt_allocator allocator;
-    node *nodes; /* the root first */
+    node *nodes; /* the root, NOWHERE, families */
     size_t count, capacity;
 };
 
@@ -101,11 +103,13 @@ rqt_status rqt_field_create(const rqt_lattice *lattice, const rqt_allocator *all
     *field = NULL;
     rqt_field *f = memory_take(allocator, sizeof *f);
     if (!f) return RQT_NO_MEMORY;
-    *f = (rqt_field){.lattice = *lattice, .allocator = *allocator, .count = 1};
+    *f = (rqt_field){.lattice = *lattice, .allocator = *allocator, .count = 2};
     making m = {f, decide, context};
     rqt_status status = RQT_NO_MEMORY;
-    if (memory_grow(allocator, (void **)&f->nodes, &f->capacity, 1, sizeof *f->nodes))
+    if (memory_grow(allocator, (void **)&f->nodes, &f->capacity, f->count, sizeof *f->nodes)) {
+        f->nodes[NOWHERE] = (node){.kind = ABSENT};
         status = make_node(&m, 0, root_of(f));
+    }
     if (status == RQT_OK) status = rqt_field_scale(f, 1);
     if (status == RQT_OK)
         *field = f;
@@ -212,51 +216,39 @@ rqt_code field_holding(const rqt_field *field, int32_t x0, int32_t y0, int32_t x
     }
 }
 
-typedef struct painting {
-    const rqt_field *field;
-    const field_cells *cells;
-    uint16_t (*value)(const void *context, rqt_code code);
-    const void *context;
-    uint16_t *painted;
-    open_box box; /* of all cells */
-} painting;
+/* ---------------------------------------------------------------------------------------------- looking -- */
 
-/* n values of the same, row by row. The rows are short: two cells, or a power of two. */
-static inline __attribute__((always_inline)) void fill(uint16_t *row, int32_t n, uint16_t value) {
-    const uint64_t four = value * UINT64_C(0x0001000100010001);
-    const uint64_t many[4] = {four, four, four, four};
-    for (; n >= 16; n -= 16, row += 16) memcpy(row, many, sizeof many);
-    for (; n >= 4; n -= 4, row += 4) memcpy(row, &four, sizeof four);
-    for (; n > 0; n--) *row++ = value;
+field_node field_node_at(const rqt_field *field, int32_t x, int32_t y, int32_t side) {
+    const int32_t end = 1 << field->lattice.K;
+    if (x < 0 || y < 0 || x >= end || y >= end) return NOWHERE;
+    field_node at = 0;
+    for (int32_t half = end / 2; half >= side && field->nodes[at].kind == SPLIT; half /= 2)
+        at = field->nodes[at].first + (uint32_t)((x & half) != 0) + 2 * (uint32_t)((y & half) != 0);
+    return at;
 }
 
-static void paint_node(const painting *p, const node *n, rqt_square s) {
-    const open_box *box = &p->box;
-    const int scale = p->cells->scale;
-    if (n->kind == SPLIT && s.side >> scale > 1) {
-        for (int c = 0; c < 4; c++) {
-            const node *child = &p->field->nodes[n->first + (uint32_t)c];
-            const rqt_square part = quarter(s, c);
-            if (child->least != RQT_CODE_INFINITY && square_meets(part, box)) paint_node(p, child, part);
+rqt_code field_node_least(const rqt_field *field, field_node at) {
+    return field->nodes[at].least;
+}
+
+/* The quarter c of a square that is cut, else the square. */
+static inline field_node part_of(const node *nodes, field_node at, int c) {
+    return nodes[at].kind == SPLIT ? nodes[at].first + (uint32_t)c : at;
+}
+
+void field_halve(const rqt_field *field, const field_node nine[9], rqt_code least[6][6]) {
+    const node *const nodes = field->nodes;
+    for (int v = 0; v < 3; v++)
+        for (int u = 0; u < 3; u++) {
+            const field_node at = nine[3 * v + u];
+            for (int c = 0; c < 4; c++)
+                least[2 * u + (c & 1)][2 * v + (c >> 1)] = nodes[part_of(nodes, at, c)].least;
         }
-        return;
-    }
-    /* Whole cells: all sides are powers of two, and what is smaller than a cell is not come to. */
-    const int32_t left = s.x > box->x0 ? (s.x - box->x0) >> scale : 0,
-                  top = s.y > box->y0 ? (s.y - box->y0) >> scale : 0;
-    const int32_t right = s.x + s.side < box->x1 ? (s.x + s.side - box->x0) >> scale : p->cells->n,
-                  bottom = s.y + s.side < box->y1 ? (s.y + s.side - box->y0) >> scale : p->cells->n;
-    const uint16_t value = p->value(p->context, n->least);
-    for (int32_t y = top; y < bottom; y++)
-        fill(p->painted + (size_t)y * (size_t)p->cells->n + left, right - left, value);
 }
 
-void field_paint(const rqt_field *field, const field_cells *cells,
-                 uint16_t (*value)(const void *context, rqt_code code), const void *context, uint16_t *painted) {
-    const int32_t across = cells->n << cells->scale;
-    const painting p = {field,   cells,   value,
-                        context, painted, {cells->x, cells->y, cells->x + across, cells->y + across}};
-    const uint16_t nothing = value(context, RQT_CODE_INFINITY);
-    fill(painted, cells->n * cells->n, nothing);
-    if (field->nodes[0].least != RQT_CODE_INFINITY) paint_node(&p, &field->nodes[0], root_of(field));
+void field_around_quarter(const rqt_field *field, const field_node nine[9], int c, field_node around[9]) {
+    for (int j = 0; j < 9; j++) {
+        const int v = 1 + (c >> 1) + j / 3, u = 1 + (c & 1) + j % 3; /* of the six by six */
+        around[j] = part_of(field->nodes, nine[v / 2 * 3 + u / 2], (u & 1) + 2 * (v & 1));
+    }
 }

@@ -38,8 +38,8 @@
  * vertices reads 173 blocks of 129 a side as it is, and 157 if no block were asked for by reach alone.
  *
  * Thresholds are not stored. A question about one vertex goes through a tree of the places' boxes and stops at the
- * first place that selects it, and through the tree of squares; a block that is read gets the thresholds of the
- * field all at once (rule_limits.c). */
+ * first place that selects it, and through the tree of squares; a block that is read goes down that tree once
+ * (rule_choose.c). */
 #include "field.h"
 #include "region_edges.h"
 #include "rule.h"
@@ -213,7 +213,9 @@ static int32_t code_at(const rqt_rule *rule, const kept_place *p, int rank) {
 }
 
 int32_t rule_field_threshold(const rqt_rule *rule, rqt_code code, int rank) {
-    const int32_t lowered = lowered_code(rqt_code_metres(code), rule->lowering[rank], rule->quantum_error);
+    const int32_t lowered = rule->lowers || rule->quantum_error > 0
+                                ? lowered_code(rqt_code_metres(code), rule->lowering[rank], rule->quantum_error)
+                                : code;
     return lowered < rule->base[rank] ? lowered : rule->base[rank];
 }
 
@@ -264,10 +266,6 @@ const rqt_lattice *rule_lattice(const rqt_rule *rule) {
 
 const rqt_field *rule_field(const rqt_rule *rule) {
     return rule->field;
-}
-
-bool rule_lowers(const rqt_rule *rule) {
-    return rule->lowers;
 }
 
 /* A place or square that holds the whole cell meets every box in it. */

@@ -13,13 +13,13 @@ typedef struct rule_range {
 rule_range rule_range_below(const rqt_rule *rule, rqt_vertex centre);
 const rqt_lattice *rule_lattice(const rqt_rule *rule);
 const rqt_field *rule_field(const rqt_rule *rule); /* NULL: none */
-bool rule_lowers(const rqt_rule *rule);
 /* The threshold of a vertex of this rank by the rule's own eps and a field's code. */
 int32_t rule_field_threshold(const rqt_rule *rule, rqt_code code, int rank);
 
-/* Of a rule with a field, for every vertex of a block, row by row, but its corners: the least error that selects it
- * on account of the rule's own eps and the field; 0 where any does. room: rule_limits_room(k) values. */
-size_t rule_limits_room(int k);
-void rule_limits(const rqt_rule *rule, const rqt_block_place *place, int k, uint16_t *limits, uint16_t *room);
+/* Of a rule with a field, without places and forced vertices: chosen[i] = 1 for every vertex of the block that is
+ * selected, row by row, else 0; 0 for its corners. What is selected, by error or a flag of the mask, must be
+ * closed. Returns the flags that all of the chosen have. */
+uint8_t rule_choose(const rqt_rule *rule, const rqt_block_place *place, const rqt_block *block, uint8_t mask,
+                    uint8_t *chosen);
 
 #endif

@@ -1,7 +1,7 @@
-"""Mutants of fields: the tree of squares, the thresholds that it gives, and those painted for a block: see ../mutants.py."""
+"""Mutants of fields: the tree of squares, the thresholds that it gives, and what they choose in a block: see ../mutants.py."""
 
 DEFINITION = "fields_equal_their_definition_on_small_rasters"
-LIMITS = "painted_limits_are_the_thresholds_that_are_asked_for"
+CHOSEN = "what_is_chosen_in_a_block_is_what_rules_select"
 TREE = "squares_come_in_order_and_boxes_find_the_least"
 
 MUTANTS = [
@@ -25,18 +25,22 @@ MUTANTS = [
      "const int32_t half = 2 << rank / 2;", "test_core_field", DEFINITION),
     ("fields: a block has one threshold", "src/core/rule.c", "range.most = rule_field_threshold(rule, square, 0);", "range.most = range.least; (void)square;",
      "test_core_field", DEFINITION),
-    ("fields: a painted centre reaches as a side does", "src/core/rule_limits.c", "d = windows[i + 2 * n + 2];", "d = windows[i];",
-     "test_core_field", LIMITS),
-    ("fields: painted centres are lowered as sides are", "src/core/rule_limits.c", "if (rule_lowers(rule)) {", "if (!rule) {",
-     "test_core_field", LIMITS),
-    ("fields: what is painted is cut at the grid's west side", "src/core/field.c", "left = s.x > box->x0 ? (s.x - box->x0) >> scale : 0",
-     "left = s.x > box->x0 ? (s.x - box->x0) >> scale : 1", "test_core_field", LIMITS),
-    ("fields: places beside one do not count in a block", "src/core/walk.c", "if (w->limits && !c.range.places && !c.range.forced) {",
-     "if (w->limits && !c.range.forced) {", "test_core_field", DEFINITION),
-    ("fields: forced vertices beside one do not count in a block", "src/core/walk.c", "if (w->limits && !c.range.places && !c.range.forced) {",
-     "if (w->limits && !c.range.places) {", "test_core_field", DEFINITION),
-    ("fields: the limits of a query are never released", "src/core/patch.c", "    memory_drop(&s->allocator, s->limits);\n", "",
-     "test_core_field", "without_memory_nothing_is_lost"),
+    ("fields: a quarter's centre in a block reaches as a side does", "src/core/rule_choose.c", "LEAST3(of, 1, quarter[0])",
+     "LEAST3(of, 1, across)", "test_core_field", CHOSEN),
+    ("fields: a side in a block reaches to its own cell only", "src/core/rule_choose.c", "LEAST4(of, 1, north)",
+     "LEAST4(of, 1, across)", "test_core_field", CHOSEN),
+    ("fields: centres in a block are lowered as sides are", "src/core/rule_choose.c", "choose_place(c, centre[i], codes.quarter[i], rank - 2)",
+     "choose_place(c, centre[i], codes.quarter[i], rank - 1)", "test_core_field", CHOSEN),
+    ("fields: a cell in a block ends one code too early", "src/core/rule_choose.c",
+     "rule_field_threshold(c->rule, least, rank - 1)", "rule_field_threshold(c->rule, least, rank - 1) + 1", "test_core_field", CHOSEN),
+    ("fields: beyond the root is the root", "src/core/field.c", "if (x < 0 || y < 0 || x >= end || y >= end) return NOWHERE;",
+     "if (x < 0 || y < 0 || x >= end || y >= end) return 0;", "test_core_field", CHOSEN),
+    ("fields: the quarters of a square change places", "src/core/field.c", "least[2 * u + (c & 1)][2 * v + (c >> 1)] =",
+     "least[2 * u + (c >> 1)][2 * v + (c & 1)] =", "test_core_field", CHOSEN),
+    ("fields: places beside one do not count in a block", "src/core/walk.c", "if (rule_field(w->query->rule) && !c.range.places && !c.range.forced)",
+     "if (rule_field(w->query->rule) && !c.range.forced)", "test_core_field", DEFINITION),
+    ("fields: forced vertices beside one do not count in a block", "src/core/walk.c", "if (rule_field(w->query->rule) && !c.range.places && !c.range.forced)",
+     "if (rule_field(w->query->rule) && !c.range.places)", "test_core_field", DEFINITION),
     ("fields: a fuzzer sees a square that is not the least", "src/core/field.c", "if (n->least >= least || !square_meets(s, box)) return least;",
      "if (!square_meets(s, box)) return least;", "fuzz/fuzz_rule", "the least is"),
 ]
