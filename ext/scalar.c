@@ -156,7 +156,7 @@ typedef struct mesh_format {
     char name[16]; /* without "+normals"; cut where it is none of ours */
 } mesh_format;
 
-#define KNOWN " strip indexed rqt increment obj ply wkb gpkg spatialite ply+normals rqt+normals"
+#define KNOWN " strip indexed rqt obj ply wkb gpkg spatialite ply+normals rqt+normals, and increment of views"
 
 static int read_format(sqlite3_value *value, mesh_format *f, char **error) {
     static const char *const own[] = {"strip", "indexed", "rqt", "increment"};

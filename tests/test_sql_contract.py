@@ -21,6 +21,7 @@ TABLES = {  # visible columns, then the arguments
     "rqt_view_triangles": ("id x0 y0 z0 x1 y1 z1 x2 y2 z2", VIEW),
     "rqt_view_strip": ("seq x y z", VIEW),
     "rqt_view_explain": ("level extent why bytes cached selected", VIEW),
+    "rqt_view_verify": ("samples drawn vertices triangles max_pixels rms_pixels x y z t_junctions overlaps", VIEW),
     "rqt_profile": ("distance x y z", ["line", "eps", "terrain"]),
     "rqt_area": ("planimetric surface volume", MESH),
     "rqt_check": ("severity block message", ["terrain"]),
