@@ -239,7 +239,7 @@ static int encode(request *r, const rqt_patch *mesh, const char *token, uint8_t 
     const view *v = r->view;
     const rqt_patch *old = v->has_last_mesh ? &v->last_mesh : NULL;
     const rqt_increment_header header = {.note = token,
-                                         .note_size = strlen(token),
+                                         .note_size = token ? strlen(token) : 0,
                                          .placement = r->terrain->placement,
                                          .unit = r->terrain->unit,
                                          .eps = r->achieved_eps,

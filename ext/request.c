@@ -52,7 +52,7 @@ static int read_region(request *r, sqlite3_value *value, char **error) {
 }
 
 /* Options and terrain; what is asked for comes next. */
-static int open(connection *c, sqlite3_value *terrain, sqlite3_value *options, request *r, char **error) {
+static int begin(connection *c, sqlite3_value *terrain, sqlite3_value *options, request *r, char **error) {
     r->options = (store_query_options){.select = RQT_SELECT_THRESHOLD,
                                        .outline = r->view ? RQT_OUTLINE_TOL : RQT_OUTLINE_EXACT};
     r->achieved_eps = r->eps;
@@ -90,7 +90,7 @@ int request_read(connection *c, sqlite3_value *region, sqlite3_value *eps, sqlit
     *r = (request){.mode = usual};
     if (!request_number(eps, "eps", &r->eps, error)) return *error ? SQLITE_ERROR : SQLITE_NOMEM;
     if (r->eps < 0) return fail(error, "eps must be 0 or more; it is %!.15g", r->eps);
-    int code = open(c, terrain, options, r, error);
+    int code = begin(c, terrain, options, r, error);
     if (code == SQLITE_OK) code = read_region(r, region, error);
     return finish(r, code, error);
 }
@@ -104,7 +104,7 @@ int request_follow_view(connection *c, sqlite3_value *camera, sqlite3_value *ter
                         view_wants wants, request *r, char **error) {
     *r = (request){.mode = REQUEST_COVER, .eps = INFINITY};
     int code = view_create(camera, &r->view, error);
-    if (code == SQLITE_OK) code = open(c, terrain, options, r, error);
+    if (code == SQLITE_OK) code = begin(c, terrain, options, r, error);
     if (code == SQLITE_OK) code = view_place(r, error);
     if (code == SQLITE_OK) code = view_settle(r, wants, error);
     if (code != SQLITE_OK) request_free(r);
