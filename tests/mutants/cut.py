@@ -35,8 +35,8 @@ MUTANTS = [
     ("snap: a square that a line ends at is left out", "src/core/region_snap.c", "box[i] -= box[i] > 0;", "box[i] -= 0;",
      "test_sql_cut.py", "mode snap is cover of the squares"),
     # outline tol
-    ("tol: the proof promises what exact does", "ext/promise.c", "if (r->options.outline != RQT_OUTLINE_TOL || t->voids == 0) return 0;",
-     "if (t->voids >= 0) return 0;", "test_sql_cut.py", "outline tol: within eps"),
+    ("tol: the proof promises what exact does", "ext/promise.c", "return r->options.outline == RQT_OUTLINE_TOL && r->terrain->voids > 0;",
+     "return false;", "test_sql_cut.py", "outline tol: within eps"),
     ("tol: the option is read and forgotten", "ext/options.c", "r->options.outline = (rqt_outline)index_of(c, value);", ";",
      "test_sql_cut.py", "outline tol left samples out"),
     # transformed regions

@@ -80,7 +80,7 @@ MUTANTS = [
     ("rules: a budget forgets the rule's eps", "src/store/budget.c",
      "    set_eps(f->question.options, eps_of(f, code));\n", "    set_eps(f->question.options, 1.5 * eps_of(f, code));\n", "test_sql_detail.py", "... by the mesh of the eps that it says"),
     ("detail: what the metric minimal cannot hold is answered", "ext/detail.c",
-     "r->options.metric != RQT_METRIC_EXACT && r->options.metric != RQT_METRIC_WEDGIE", "false",
+     "r->options.metric == RQT_METRIC_EXACT || r->options.metric == RQT_METRIC_WEDGIE", "true",
      "test_sql_detail.py", "metric local and detail"),
     ("detail: a NULL geometry is everything", "ext/detail.c",
      "if (type != SQLITE_TEXT && type != SQLITE_BLOB)\n", "if (type != SQLITE_TEXT && type != SQLITE_BLOB && type != SQLITE_NULL)\n",
