@@ -58,6 +58,8 @@ def test_budgets():
     check("F38_counts_fall_and_tolerances_rise", all(a[0] > b[0] and a[1] < b[1] for a, b in zip(steps, steps[1:])), steps[:5])
     check("F38_tolerances_are_steps_of_2^(1/128)", all(abs(math.log2(t / 2) * 128 - round(math.log2(t / 2) * 128)) < 1e-6 for _, t in steps),
           steps[:5])
+    # A search that stops early finds multiples of how far it goes.
+    equal("F38_no_step_of_the_ladder_is_passed_over", math.gcd(*(round(math.log2(t / 2) * 128) for _, t in steps)), 1)
     # The tolerance of a budget is the least: one triangle less than a step has is the next step that has fewer, and all budgets between two
     # counts get the lower one.
     dice, fine = s.Dice(5), True

@@ -41,5 +41,5 @@ MUTANTS = [
     ("previous: after a jump the last camera still counts", "ext/follow.c", "        v->camera = camera;\n", "", "test_sql_previous.py",
      "F37_tokens_mean_the_same_to_every_connection"),
     ("budget: the step above the one that fits will do", "ext/budget.c", "high - low > 1", "high - low > 2", "test_sql_previous.py",
-     "F38_the_smallest_tolerance_that_keeps_the_budget"),
+     "F38_no_step_of_the_ladder_is_passed_over"),
 ]
