@@ -26,6 +26,21 @@
 #define MOST_REACH 1024
 #define ROWS_REACH 256 /* of a view: its rows are read once for those beside them */
 
+int promise_mesh_take(request *r, promise_mesh *mesh, char **error) {
+    rqt_patch patch;
+    *mesh = (promise_mesh){NULL, 0};
+    const int code = request_patch(r, RQT_PRODUCT_TRIANGLES, &patch, NULL, error);
+    if (code != SQLITE_OK) return code;
+    mesh->triangles = sqlite3_malloc64((patch.triangle_count + 1) * sizeof *mesh->triangles);
+    if (mesh->triangles) mesh->count = patch.triangle_count;
+    for (size_t i = 0; i < 3 * mesh->count; i++) {
+        const rqt_patch_vertex *v = &patch.vertices[patch.triangles[i]];
+        mesh->triangles[i / 3].corner[i % 3] = (verify_corner){v->col, v->row, v->q};
+    }
+    store_keep(r->store, &patch);
+    return mesh->triangles ? SQLITE_OK : SQLITE_NOMEM;
+}
+
 static bool is_valid(const promise *p, int32_t col, int32_t row) {
     if (col < p->col || row < p->row || col >= p->col + p->width || row >= p->row + p->height) return false;
     return p->valid[(size_t)(row - p->row) * (size_t)p->width + (size_t)(col - p->col)] != 0;

@@ -1,9 +1,19 @@
-/* promise.h - the window that a proof looks at, and which of its samples the mesh has promised to cover. promise.c
- */
+/* promise.h - what a proof looks at: the triangles of an answer, a window of samples, and which of those the mesh
+ * has promised to cover. promise.c */
 #ifndef RQT_PROMISE_H
 #define RQT_PROMISE_H
 
 #include "functions.h"
+
+#include "verify.h"
+
+/* The triangles of an answer as the verifier takes them, to be released with sqlite3_free; on failure there are
+ * none. */
+typedef struct promise_mesh {
+    verify_triangle *triangles;
+    size_t count;
+} promise_mesh;
+int promise_mesh_take(request *r, promise_mesh *mesh, char **error);
 
 typedef struct promise {
     int32_t col, row, width, height; /* of the window */

@@ -1,8 +1,6 @@
 /* verify_table.c - rqt_verify: hands the returned triangles and the stored samples to the independent verifier. */
 #include "promise.h"
 
-#include "verify.h"
-
 #include <math.h>
 #include <string.h>
 
@@ -82,18 +80,14 @@ typedef struct evidence {
 } evidence;
 
 static int take_patch(request *r, evidence *e, char **error) {
-    rqt_patch patch;
-    int code = request_patch(r, RQT_PRODUCT_TRIANGLES, &patch, NULL, error);
-    if (code != SQLITE_OK) return code;
-    e->count = patch.triangle_count;
-    e->triangles = sqlite3_malloc64((e->count + 1) * sizeof *e->triangles);
-    if (!e->triangles) code = SQLITE_NOMEM;
-    for (size_t i = 0; code == SQLITE_OK && i < 3 * e->count; i++) {
-        const rqt_patch_vertex *v = &patch.vertices[patch.triangles[i]];
-        e->triangles[i / 3].corner[i % 3] = (verify_corner){v->col, v->row, v->q};
+    promise_mesh mesh;
+    const int code = promise_mesh_take(r, &mesh, error);
+    e->count = mesh.count;
+    e->triangles = mesh.triangles;
+    for (size_t i = 0; i < 3 * e->count; i++) {
+        const verify_corner *v = &e->triangles[i / 3].corner[i % 3];
         grow_box(e->box, v->col, v->row);
     }
-    store_keep(r->store, &patch);
     return code;
 }
 

@@ -8,8 +8,6 @@
 #include "promise.h"
 #include "view.h"
 
-#include "verify.h"
-
 #include <math.h>
 #include <string.h>
 
@@ -66,33 +64,14 @@ static bool has_to_cover(void *context, int32_t col, int32_t row, double slack) 
 }
 
 /* ------------------------------------------------------------------------------------------------- judging -- */
-typedef struct evidence {
-    verify_triangle *triangles;
-    size_t count;
-} evidence;
-
-static int take_triangles(request *r, evidence *e, char **error) {
-    rqt_patch patch;
-    int code = request_patch(r, RQT_PRODUCT_TRIANGLES, &patch, NULL, error);
-    if (code != SQLITE_OK) return code;
-    e->count = patch.triangle_count;
-    e->triangles = sqlite3_malloc64((e->count + 1) * sizeof *e->triangles);
-    if (!e->triangles) code = SQLITE_NOMEM;
-    for (size_t i = 0; code == SQLITE_OK && i < 3 * e->count; i++) {
-        const rqt_patch_vertex *v = &patch.vertices[patch.triangles[i]];
-        e->triangles[i / 3].corner[i % 3] = (verify_corner){v->col, v->row, v->q};
-    }
-    store_keep(r->store, &patch);
-    return code;
-}
-
 static int code_of(verify_status status, char **error) {
     if (status == VERIFY_NO_MEMORY) return SQLITE_NOMEM;
     return status == VERIFY_INVALID ? fail(error, "camera and terrain have no picture in finite numbers")
                                     : SQLITE_OK;
 }
 
-static int judge_rows(const request *r, const evidence *e, int32_t first, int32_t last, proof *p, char **error) {
+static int judge_rows(const request *r, const promise_mesh *e, int32_t first, int32_t last, proof *p,
+                      char **error) {
     const view *v = r->view;
     const rqt_camera *c = &v->camera;
     const rqt_unit *unit = &r->terrain->unit;
@@ -137,8 +116,8 @@ static int find_worst(const request *r, proof *p, char **error) {
 static int prove(request *r, proof *p, char **error) {
     const int32_t width = r->terrain->lattice.width, height = r->terrain->lattice.height;
     const int32_t band = width < BAND_SAMPLES ? BAND_SAMPLES / width : 1;
-    evidence e = {0};
-    int code = take_triangles(r, &e, error);
+    promise_mesh e;
+    int code = promise_mesh_take(r, &e, error);
     if (code == SQLITE_OK) code = code_of(verify_topology(e.triangles, e.count, &p->mesh), error);
     for (int32_t row = 0; row < height && code == SQLITE_OK; row += band) {
         const int32_t last = height - row > band ? row + band - 1 : height - 1;

@@ -28,7 +28,6 @@ typedef struct trial {
     int places;
     square *square; /* NULL: no field */
     int squares;
-    double factor; /* of the field; 0 counts as 1 */
     double eps, quantum_error, lowering[RQT_RANKS];
     oracle_point forced[MOST_FORCED];
     int forced_count;
@@ -77,19 +76,15 @@ static inline int code_of_eps(const trial *t, double eps, int rank) {
     return code;
 }
 
-/* The eps of a square as the field uses it: the largest code below the float below it, scaled. */
-static inline double eps_of_square(const trial *t, const square *s) {
+/* The eps of a square as the field uses it: the largest code that is not above it. */
+static inline double eps_of_square(const square *s) {
     if (isinf(s->eps)) return INFINITY;
-    mpq_t exact, factor;
-    float f = (float)s->eps;
-    if (f > s->eps) f = nextafterf(f, 0);
-    mpq_inits(exact, factor, NULL);
-    mpq_set_d(exact, f);
-    mpq_set_d(factor, t->factor > 0 ? t->factor : 1);
-    mpq_mul(exact, exact, factor);
+    mpq_t exact;
+    mpq_init(exact);
+    mpq_set_d(exact, s->eps);
     oracle_code_value(exact, oracle_code_down(exact));
     const double eps = mpq_get_d(exact);
-    mpq_clears(exact, factor, NULL);
+    mpq_clear(exact);
     return eps;
 }
 
@@ -197,7 +192,6 @@ static inline rqt_field *core_field_create(const trial *t) {
     deciding d = {t, 0, 0};
     assert_int_equal(rqt_field_create(&t->m.grid.lattice, &test_allocator, decide_square, &d, &field), RQT_OK);
     CHECK(d.next == t->squares, "%d squares are made of %d", d.next, t->squares);
-    if (t->factor > 0) assert_int_equal(rqt_field_scale(field, t->factor), RQT_OK);
     return field;
 }
 
@@ -241,7 +235,7 @@ static inline void describe(const trial *t) {
     for (int n = 0; n < RQT_RANKS; n++)
         if (t->lowering[n] > 0) print_error("  lowered by %.17g for rank %d\n", t->lowering[n], n);
     if (t->has_border) print_error("  border of %s\n", t->border.text);
-    if (t->square) print_error("  field, times %g:\n", t->factor > 0 ? t->factor : 1);
+    if (t->square) print_error("  field:\n");
     for (int n = 0; n < t->squares; n++)
         print_error("    eps %.17g in (%d,%d), side %d\n", t->square[n].eps, t->square[n].x, t->square[n].y,
                     t->square[n].side);
@@ -554,7 +548,7 @@ static inline void give_field(trial *t, int finest, int share) {
     t->square = calloc(MOST_SQUARES, sizeof *t->square);
     if (!t->square) abort();
     random_squares(t, 0, 0, t->m.o.side - 1, finest, share);
-    for (int n = 0; n < t->squares; n++) t->square[n].used = eps_of_square(t, &t->square[n]);
+    for (int n = 0; n < t->squares; n++) t->square[n].used = eps_of_square(&t->square[n]);
 }
 
 static inline void trial_free(trial *t) {

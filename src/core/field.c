@@ -8,9 +8,7 @@
  * Which squares exist. Those that blocks exist for: the north-west corner is before the last column and the last
  * row (in a raster of one column or row: the first). Every sample lies in the closed square of one: what a square
  * further out has in common with the raster is on its west or north side, and so on a side of the one before it.
- * What does not exist asks for nothing.
- *
- * An eps is kept as a float, rounded down, which is more than a code can tell apart. */
+ * What does not exist asks for nothing. */
 #include "field.h"
 
 #include <math.h>
@@ -20,10 +18,7 @@ enum { ABSENT, LEAF, SPLIT };
 #define NOWHERE 1 /* the node of all that is outside the root */
 
 typedef struct node {
-    union {
-        float eps;      /* LEAF: as it was told */
-        uint32_t first; /* SPLIT: of four */
-    };
+    uint32_t first;   /* SPLIT: of four */
     uint32_t squares; /* that are left in it */
     rqt_code least;   /* of their codes; RQT_CODE_INFINITY: nothing is asked for */
     uint8_t kind;
@@ -57,18 +52,6 @@ static bool exists(const rqt_lattice *lattice, rqt_square s) {
     return (s.x == 0 || s.x < lattice->width - 1) && (s.y == 0 || s.y < lattice->height - 1);
 }
 
-/* The largest float that is not above eps >= 0. */
-static float float_below(double eps) {
-    float f = (float)eps;
-    if ((double)f > eps) { /* so it is above 0: the float before has the bits before */
-        uint32_t bits;
-        memcpy(&bits, &f, sizeof bits);
-        bits--;
-        memcpy(&f, &bits, sizeof f);
-    }
-    return f;
-}
-
 static rqt_status make_node(making *m, size_t at, rqt_square s) {
     rqt_field *field = m->field;
     double eps = NAN;
@@ -76,7 +59,8 @@ static rqt_status make_node(making *m, size_t at, rqt_square s) {
     if (step == RQT_FIELD_FAIL) return RQT_READ_FAILED;
     if (step == RQT_FIELD_LEAF) {
         if (!(eps >= 0)) return RQT_INVALID;
-        field->nodes[at] = (node){.eps = float_below(eps), .squares = 1, .kind = LEAF};
+        const rqt_code code = isinf(eps) ? RQT_CODE_INFINITY : rqt_code_floor(eps);
+        field->nodes[at] = (node){.squares = 1, .least = code, .kind = LEAF};
         return RQT_OK;
     }
     if (step != RQT_FIELD_SPLIT || s.side == 1) return RQT_INVALID;
@@ -85,16 +69,18 @@ static rqt_status make_node(making *m, size_t at, rqt_square s) {
         !memory_grow(&field->allocator, (void **)&field->nodes, &field->capacity, first + 4, sizeof *field->nodes))
         return RQT_NO_MEMORY;
     field->count += 4;
-    memset(&field->nodes[first], 0, 4 * sizeof *field->nodes);
-    uint32_t squares = 0;
+    for (size_t c = 0; c < 4; c++) field->nodes[first + c] = (node){.least = RQT_CODE_INFINITY, .kind = ABSENT};
+    node whole = {.first = (uint32_t)first, .least = RQT_CODE_INFINITY, .kind = SPLIT};
     for (int c = 0; c < 4; c++) {
         const rqt_square part = quarter(s, c);
         if (!exists(&field->lattice, part)) continue;
         const rqt_status status = make_node(m, first + (size_t)c, part);
         if (status != RQT_OK) return status;
-        squares += field->nodes[first + (size_t)c].squares;
+        const node *made = &field->nodes[first + (size_t)c];
+        whole.squares += made->squares;
+        if (made->least < whole.least) whole.least = made->least;
     }
-    field->nodes[at] = (node){.first = (uint32_t)first, .squares = squares, .kind = SPLIT};
+    field->nodes[at] = whole;
     return RQT_OK;
 }
 
@@ -107,10 +93,9 @@ rqt_status rqt_field_create(const rqt_lattice *lattice, const rqt_allocator *all
     making m = {f, decide, context};
     rqt_status status = RQT_NO_MEMORY;
     if (memory_grow(allocator, (void **)&f->nodes, &f->capacity, f->count, sizeof *f->nodes)) {
-        f->nodes[NOWHERE] = (node){.kind = ABSENT};
+        f->nodes[NOWHERE] = (node){.least = RQT_CODE_INFINITY, .kind = ABSENT};
         status = make_node(&m, 0, root_of(f));
     }
-    if (status == RQT_OK) status = rqt_field_scale(f, 1);
     if (status == RQT_OK)
         *field = f;
     else
@@ -123,30 +108,6 @@ void rqt_field_free(rqt_field *field) {
     const rqt_allocator allocator = field->allocator;
     memory_drop(&allocator, field->nodes);
     memory_drop(&allocator, field);
-}
-
-/* A float times a double, rounded down: by 26 bits of the factor and the other 27, which are exact each. What the
- * sum of the two rounds away is recovered. */
-static double product_below(float eps, double factor) {
-    uint64_t bits;
-    memcpy(&bits, &factor, sizeof bits);
-    const double high = bits_double(bits & ~((UINT64_C(1) << 27) - 1)), low = factor - high;
-    const double one = (double)eps * high, other = (double)eps * low, sum = one + other;
-    return (one - sum) + other < 0 ? nextafter(sum, 0) : sum;
-}
-
-rqt_status rqt_field_scale(rqt_field *field, double factor) {
-    if (!(factor > 0) || !isfinite(factor)) return RQT_INVALID;
-    for (size_t at = field->count; at-- > 0;) {
-        node *n = &field->nodes[at];
-        n->least = RQT_CODE_INFINITY;
-        if (n->kind == LEAF && !isinf(n->eps)) n->least = rqt_code_floor(product_below(n->eps, factor));
-        for (int c = 0; n->kind == SPLIT && c < 4; c++) {
-            const rqt_code code = field->nodes[n->first + (uint32_t)c].least;
-            if (code < n->least) n->least = code;
-        }
-    }
-    return RQT_OK;
 }
 
 /* ---------------------------------------------------------------------------------------------- squares -- */

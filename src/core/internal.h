@@ -129,6 +129,10 @@ static inline bool lattice_has_area(const rqt_lattice *lattice, rqt_vertex v) {
  * them in the block. block.c */
 void block_settle_past(rqt_block *block);
 
+/* Bits of x in the even places, of y in the odd ones; and back: y is morton_x(code >> 1). lattice.c */
+uint64_t morton_code(uint32_t x, uint32_t y);
+uint32_t morton_x(uint64_t code);
+
 /* Where column x (0 .. 2^K) of the lattice sits in the arrays of rqt_errors; -1 when it is past the last sample and
  * no error can reach it. lattice.c */
 int32_t lattice_slot(int32_t x, int32_t samples);

@@ -133,7 +133,11 @@ static uint64_t spread(uint32_t v) {
     return (x | x << 1) & UINT64_C(0x5555555555555555);
 }
 
-static uint32_t gather(uint64_t x) {
+uint64_t morton_code(uint32_t x, uint32_t y) {
+    return spread(x) | spread(y) << 1;
+}
+
+uint32_t morton_x(uint64_t x) {
     x &= UINT64_C(0x5555555555555555);
     x = (x | x >> 1) & UINT64_C(0x3333333333333333);
     x = (x | x >> 2) & UINT64_C(0x0F0F0F0F0F0F0F0F);
@@ -143,7 +147,7 @@ static uint32_t gather(uint64_t x) {
 }
 
 rqt_block_number rqt_block_number_of(int level, int32_t i, int32_t j) {
-    return (UINT64_C(1) << (2 * level)) | spread((uint32_t)i) | spread((uint32_t)j) << 1;
+    return (UINT64_C(1) << (2 * level)) | morton_code((uint32_t)i, (uint32_t)j);
 }
 
 int rqt_block_levels(const rqt_lattice *lattice, int k) {
@@ -157,7 +161,7 @@ rqt_status rqt_block_locate(const rqt_lattice *lattice, int k, rqt_block_number 
     const int level = top_bit / 2;
     if (top_bit % 2 != 0 || level > lattice->K - k) return RQT_INVALID;
     const uint64_t morton = number ^ (UINT64_C(1) << top_bit);
-    const int32_t i = (int32_t)gather(morton), j = (int32_t)gather(morton >> 1);
+    const int32_t i = (int32_t)morton_x(morton), j = (int32_t)morton_x(morton >> 1);
     const int32_t side = 1 << (lattice->K - level), stride = side >> k;
     const int32_t x = i * side, y = j * side;
     /* In a raster of one column or row the first block is the only one along it. */

@@ -6,30 +6,12 @@
  * same order. Triangles go by the number of their first vertex, the apex, then of the second and the third. */
 #include "order.h"
 
-static uint64_t spread(uint32_t v) {
-    uint64_t x = v;
-    x = (x | x << 16) & UINT64_C(0x0000FFFF0000FFFF);
-    x = (x | x << 8) & UINT64_C(0x00FF00FF00FF00FF);
-    x = (x | x << 4) & UINT64_C(0x0F0F0F0F0F0F0F0F);
-    x = (x | x << 2) & UINT64_C(0x3333333333333333);
-    return (x | x << 1) & UINT64_C(0x5555555555555555);
-}
-
-static int32_t gather(uint64_t x) {
-    x &= UINT64_C(0x5555555555555555);
-    x = (x | x >> 1) & UINT64_C(0x3333333333333333);
-    x = (x | x >> 2) & UINT64_C(0x0F0F0F0F0F0F0F0F);
-    x = (x | x >> 4) & UINT64_C(0x00FF00FF00FF00FF);
-    x = (x | x >> 8) & UINT64_C(0x0000FFFF0000FFFF);
-    return (int32_t)(uint32_t)(x | x >> 16);
-}
-
 uint64_t order_key(int32_t col, int32_t row) {
-    return spread((uint32_t)col) | spread((uint32_t)row) << 1;
+    return morton_code((uint32_t)col, (uint32_t)row);
 }
 
 rqt_vertex order_place(uint64_t key) {
-    return (rqt_vertex){gather(key), gather(key >> 1)};
+    return (rqt_vertex){(int32_t)morton_x(key), (int32_t)morton_x(key >> 1)};
 }
 
 int order_compare(const uint32_t a[3], const uint32_t b[3]) {

@@ -622,16 +622,14 @@ typedef rqt_field_step rqt_field_decide(void *context, rqt_square square, double
 rqt_status rqt_field_create(const rqt_lattice *lattice, const rqt_allocator *allocator, rqt_field_decide *decide,
                             void *context, rqt_field **field);
 void rqt_field_free(rqt_field *field);
-/* Every eps becomes what it was when the field was made, as the float below it, times factor: > 0, finite (else
- * RQT_INVALID); rounded down to a code. */
-rqt_status rqt_field_scale(rqt_field *field, double factor);
-/* The squares that are left, in Morton order; false: there is no nth. eps is that of the code, as used. O(K). */
+/* The squares that are left, in Morton order; false: there is no nth. eps is rounded down to a code, as used. O(K).
+ */
 size_t rqt_field_count(const rqt_field *field);
 bool rqt_field_square(const rqt_field *field, size_t n, rqt_square *square, double *eps);
 /* The least eps of the squares that have a point in common with the open box; infinity where there is none. */
 double rqt_field_least(const rqt_field *field, int32_t x0, int32_t y0, int32_t x1, int32_t y1);
-/* The field must outlive the rule, or the next call of this; NULL: none. rqt_field_scale changes what the rule
- * selects, at once: not while a query runs. RQT_INVALID for a field over another raster. */
+/* The field must outlive the rule, or the next call of this; NULL: none. RQT_INVALID for a field over another
+ * raster. */
 rqt_status rqt_rule_set_field(rqt_rule *rule, const rqt_field *field);
 
 /* The largest code that an error may have without the vertex being selected for it; -1: none. */

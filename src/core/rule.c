@@ -130,11 +130,8 @@ rqt_status rqt_rule_set_lowering(rqt_rule *rule, const double metres[RQT_RANKS])
 static uint64_t order_of(const region_box *box) {
     const int64_t most = INT64_C(1) << 22;
     int64_t c[2] = {(box->x0 / 2 + box->x1 / 2) / REGION_UNIT, (box->y0 / 2 + box->y1 / 2) / REGION_UNIT};
-    uint64_t order = 0;
     for (int i = 0; i < 2; i++) c[i] = (c[i] < -most ? -most : c[i] > most ? most : c[i]) + most;
-    for (int bit = 23; bit >= 0; bit--)
-        order = order << 2 | (uint64_t)(c[1] >> bit & 1) << 1 | (uint64_t)(c[0] >> bit & 1);
-    return order;
+    return morton_code((uint32_t)c[0], (uint32_t)c[1]);
 }
 
 /* Merge sort by order, with room for as many again; what is equal stays in order. The result is in `places`. */

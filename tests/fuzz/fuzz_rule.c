@@ -94,11 +94,6 @@ static bool give_field(input *in, ruling *r, const rqt_lattice *l, const rqt_all
         return true;
     }
     if (!went_well(status, h)) return false;
-    if (take_between(in, 0, 1)) {
-        const double factor = take_double(in);
-        HOLD(rqt_field_scale(r->field, factor) == (factor > 0 && isfinite(factor) ? RQT_OK : RQT_INVALID), "%g",
-             factor);
-    }
     look_at_field(in, r->field, l);
     HOLD(rqt_rule_set_field(r->rule, r->field) == RQT_OK, "field");
     return true;
