@@ -29,16 +29,17 @@
 int promise_mesh_take(request *r, promise_mesh *mesh, char **error) {
     rqt_patch patch;
     *mesh = (promise_mesh){NULL, 0};
-    const int code = request_patch(r, RQT_PRODUCT_TRIANGLES, &patch, NULL, error);
+    int code = request_patch(r, RQT_PRODUCT_TRIANGLES, &patch, NULL, error);
     if (code != SQLITE_OK) return code;
     mesh->triangles = sqlite3_malloc64((patch.triangle_count + 1) * sizeof *mesh->triangles);
-    if (mesh->triangles) mesh->count = patch.triangle_count;
-    for (size_t i = 0; i < 3 * mesh->count; i++) {
+    if (!mesh->triangles) code = SQLITE_NOMEM;
+    for (size_t i = 0; code == SQLITE_OK && i < 3 * patch.triangle_count; i++) {
         const rqt_patch_vertex *v = &patch.vertices[patch.triangles[i]];
         mesh->triangles[i / 3].corner[i % 3] = (verify_corner){v->col, v->row, v->q};
     }
+    if (code == SQLITE_OK) mesh->count = patch.triangle_count;
     store_keep(r->store, &patch);
-    return mesh->triangles ? SQLITE_OK : SQLITE_NOMEM;
+    return code;
 }
 
 static bool is_valid(const promise *p, int32_t col, int32_t row) {
