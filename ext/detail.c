@@ -9,7 +9,7 @@
  * what it says: no database has changed (store_state), the name means the same table, and it is a table with rows
  * of its own. Views may say something else each time, what temp holds changes unseen, and transformations go by
  * tables and functions that may be anywhere: those are read for each query. */
-#include "functions.h"
+#include "view.h"
 
 #include <cjson/cJSON.h>
 #include <string.h>
@@ -349,8 +349,11 @@ static bool is_interrupted(void *context) {
 
 int rule_read(request *r, char **error) {
     const bool border = r->mode == REQUEST_BORDER;
-    if (!r->detail && !border && r->frame_kind == FRAME_CRS) return SQLITE_OK;
-    const char *option = r->detail ? "option \"detail\"" : border ? "mode \"border\"" : "option \"frame\"";
+    if (!r->detail && !border && r->frame_kind == FRAME_CRS && !r->view) return SQLITE_OK;
+    const char *option = r->view     ? "a view"
+                         : r->detail ? "option \"detail\""
+                         : border    ? "mode \"border\""
+                                     : "option \"frame\"";
     if (r->options.metric != RQT_METRIC_EXACT && r->options.metric != RQT_METRIC_WEDGIE)
         return fail(error,
                     "%s needs the metric exact or wedgie: it adds vertices, and with metric \"%s\" nothing is "
@@ -363,6 +366,7 @@ int rule_read(request *r, char **error) {
         rqt_rule_create(&r->terrain->lattice, r->terrain->quantum_error, store_allocator(), &r->options.rule);
     if (status == RQT_OK && r->places)
         status = rqt_rule_set_places(r->options.rule, r->places->items, r->places->count);
+    if (status == RQT_OK && r->view) status = rqt_rule_set_field(r->options.rule, r->view->field);
     if (status == RQT_OK && border) {
         rqt_region_grow_rectangle(r->region);
         status = rqt_rule_force_border(r->options.rule, r->region, is_interrupted, &w);

@@ -156,6 +156,10 @@ static bool holds_word(const char *text, const char *word) {
     return false;
 }
 
+bool terrain_is_above_geoid(const store_terrain *t) {
+    return holds_word(t->vertical, "EGM96");
+}
+
 static int lower_eps(request *r, space_frame *f, char **error) {
     const store_terrain *t = f->terrain;
     const rqt_placement *at = &t->placement;
@@ -184,7 +188,7 @@ int frame_read(request *r, char **error) {
     if (!t->lonlat || !t->wgs84)
         return fail(error, "option \"frame\":\"%s\" is for terrains in longitude and latitude on WGS 84; %s is not",
                     name, t->name);
-    const bool geoid = holds_word(t->vertical, "EGM96");
+    const bool geoid = terrain_is_above_geoid(t);
     if (!geoid && t->vertical[0] && !holds_word(t->vertical, "ellipsoid"))
         return fail(
             error,
@@ -204,8 +208,8 @@ int frame_read(request *r, char **error) {
         sqlite3_snprintf(sizeof f->title, f->title, "%s, frame enu about longitude %!.15g latitude %!.15g height 0",
                          t->name, lon, lat);
     char why[256] = "";
-    const int status = geo_frame_create(r->frame_kind == FRAME_ECEF ? GEO_ECEF : GEO_ENU, lon, lat, geoid, &f->geo,
-                                        why, sizeof why);
+    const int status = geo_frame_create(r->frame_kind == FRAME_ECEF ? GEO_ECEF : GEO_ENU, &GEO_WGS84, lon, lat,
+                                        geoid, &f->geo, why, sizeof why);
     if (status != GEO_OK)
         return status == GEO_NO_MEMORY ? SQLITE_NOMEM : fail(error, "option \"frame\":\"%s\": %s", name, why);
     f->seam = fabs(fabs((t->lattice.width - 1) * t->placement.dx) - 360) < 1e-9 * 360;

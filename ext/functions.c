@@ -10,6 +10,10 @@
 #define READS SQLITE_INNOCUOUS
 
 #define MESH "region, eps [, terrain [, options]]"
+#define VIEW "camera [, terrain [, options]]"
+#define CAMERA                                                                                              \
+    "'{\"eye\":[-71.5,44.1,2500],\"at\":[-71.3033,44.2705,1500],\"fovy\":45,\"width\":1024,\"height\":768," \
+    "\"tau\":2}'"
 #define SUMMIT "rqt_circle(-71.3033, 44.2705, 5000)"
 
 const function rqt_functions[] = {
@@ -116,6 +120,52 @@ const function rqt_functions[] = {
      .example = "SELECT level, count(*), sum(bytes) FROM rqt_explain(" SUMMIT ", 10) GROUP BY level",
      .fill = fill_explain,
      .hidden = "block, achieved_eps"},
+    {.name = "rqt_view",
+     .arguments = VIEW,
+     .returns = "x, y, z, error, level",
+     .purpose =
+         "The vertices of the mesh that a view needs, columns as of rqt_range. camera: JSON with eye [x,y,z]; at "
+         "[x,y,z], or yaw (degrees clockwise from north) and pitch (degrees upward); roll (0); fovy (degrees); "
+         "width, height and tau (1): pixels; near (0) and far in metres; exaggeration (1) of the ground's heights; "
+         "position of eye and at: crs, lonlat or ecef. No sample that is drawn is more than tau pixels from its "
+         "place in the mesh. Terrains in degrees are in space. Outlines of voids are tol unless options say exact.",
+     .example = "SELECT count(*) FROM rqt_view(" CAMERA ")",
+     .fill = fill_view,
+     .hidden = "col, row, q, achieved_tau, guaranteed, gpkg"},
+    {.name = "rqt_view_triangles",
+     .arguments = VIEW,
+     .returns = "id, x0, y0, z0, x1, y1, z1, x2, y2, z2",
+     .purpose =
+         "The triangles of the mesh that a view needs, columns as of rqt_triangles. Heights are those of the "
+         "terrain, not exaggerated.",
+     .example = "SELECT count(*), max(guaranteed) FROM rqt_view_triangles(" CAMERA ")",
+     .fill = fill_view_triangles,
+     .hidden = "achieved_tau, guaranteed, gpkg"},
+    {.name = "rqt_view_strip",
+     .arguments = VIEW,
+     .returns = "seq, x, y, z",
+     .purpose = "The same triangles as one generalized strip, as of rqt_strip.",
+     .example = "SELECT count(*) FROM rqt_view_strip(" CAMERA ")",
+     .fill = fill_view_strip,
+     .hidden = "achieved_tau, guaranteed"},
+    {.name = "rqt_view_mesh",
+     .arguments = "camera, format [, terrain [, options]]",
+     .returns = "BLOB, TEXT for obj",
+     .purpose =
+         "The mesh that a view needs as a file's bytes; formats as of rqt_mesh. The eps that a format has is "
+         "infinite: a view promises pixels.",
+     .example = "SELECT length(rqt_view_mesh(" CAMERA ", 'rqt'))",
+     .call = call_view_mesh,
+     .least = 2,
+     .most = 4,
+     .flags = READS},
+    {.name = "rqt_view_explain",
+     .arguments = VIEW,
+     .returns = "level, extent, why, bytes, cached, selected",
+     .purpose = "What the query of a view reads, as rqt_explain.",
+     .example = "SELECT level, count(*), sum(bytes) FROM rqt_view_explain(" CAMERA ") GROUP BY level",
+     .fill = fill_view_explain,
+     .hidden = "block, achieved_tau, guaranteed"},
     {.name = "rqt_height",
      .arguments = "x, y [, eps [, terrain]]",
      .returns = "REAL",

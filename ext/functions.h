@@ -73,6 +73,7 @@ typedef enum request_mode { REQUEST_COVER, REQUEST_SNAP, REQUEST_BORDER, REQUEST
 /* region, eps, terrain, options, as every mesh function takes them. request.c */
 typedef enum frame_kind { FRAME_CRS, FRAME_ECEF, FRAME_ENU } frame_kind; /* in the order of options.c */
 typedef struct space_frame space_frame;
+typedef struct view view; /* view.h */
 typedef struct request {
     connection *connection; /* held while the request lives */
     store *store;
@@ -89,11 +90,15 @@ typedef struct request {
     bool fans;             /* the strip goes round the centres of blocks */
     int64_t max_vertices;  /* 0: any number */
     double achieved_eps;   /* of the mesh: eps, or more to keep within max_vertices; known after request_patch */
+    view *view; /* NULL, or the view that is asked for: then the region is what may be seen, and eps is infinite */
 } request;
 
 /* `usual` is the mode when the options name none. */
 int request_read(connection *c, sqlite3_value *region, sqlite3_value *eps, sqlite3_value *terrain,
                  sqlite3_value *options, request_mode usual, request *out, char **error);
+/* The same from a camera: a view. */
+int request_read_view(connection *c, sqlite3_value *camera, sqlite3_value *terrain, sqlite3_value *options,
+                      request *out, char **error);
 /* A patch with what the product needs; of strips, the one that the options want. Give it back with store_keep. */
 int request_patch(request *r, rqt_product product, rqt_patch *patch, store_reads *reads, char **error);
 /* Mode cut: that patch clipped to the region, instead. Release with rqt_cut_free. cut.c */
@@ -148,6 +153,8 @@ int lines_read(connection *c, const store_terrain *t, sqlite3_value *value, line
 void lines_free(line_set *lines);
 /* Metres in a unit of a terrain's x and y, where they are no angles; 1 when its CRS does not say. */
 double terrain_metre(const store_terrain *t);
+/* Are its heights above EGM96, as far as its source says? frame.c */
+bool terrain_is_above_geoid(const store_terrain *t);
 /* Options of the contract; sentences name what is unknown and what is not in this version. options.c */
 int options_read(const char *json, request *r, char **error);
 
@@ -156,11 +163,13 @@ int fail(char **error, const char *format, ...);
 
 /* The functions themselves, by file. */
 fill_rows fill_range, fill_triangles, fill_strip;                          /* mesh_tables.c */
+fill_rows fill_view, fill_view_triangles, fill_view_strip;                 /* mesh_tables.c */
 fill_rows fill_profile, fill_area;                                         /* profile.c, area.c */
+fill_rows fill_view_explain;                                               /* insight_tables.c */
 fill_rows fill_terrains, fill_explain, fill_verify, fill_check, fill_help; /* insight_tables.c, verify_table.c */
-scalar_call call_version, call_build_info, call_mesh, call_height;         /* scalar.c */
-scalar_call call_block_info, call_block_check, call_block_dump;            /* block_functions.c */
-scalar_call call_bbox, call_circle, call_corridor;                         /* shapes.c */
-scalar_call call_delta;                                                    /* delta.c */
+scalar_call call_version, call_build_info, call_mesh, call_view_mesh, call_height; /* scalar.c */
+scalar_call call_block_info, call_block_check, call_block_dump;                    /* block_functions.c */
+scalar_call call_bbox, call_circle, call_corridor;                                 /* shapes.c */
+scalar_call call_delta;                                                            /* delta.c */
 
 #endif

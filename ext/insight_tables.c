@@ -1,5 +1,5 @@
 /* insight_tables.c - tables about the terrains themselves: rqt_terrains, rqt_explain, rqt_check, rqt_help. */
-#include "functions.h"
+#include "view.h"
 
 #include "format.h"
 
@@ -141,12 +141,19 @@ typedef struct explanation {
     int k;
     rqt_placement placement;
     double achieved_eps;
-    bool by_rule; /* detail or mode border: where em is too large, or a vertex is forced, children answer */
+    enum {
+        BY_EPS,
+        BY_RULE,
+        BY_VIEW
+    } by;                /* rule: detail, mode border, frame: where em is too large, or a vertex is
+                            forced, children answer. The same in a view */
+    double achieved_tau; /* of a view */
+    bool guaranteed;
 } explanation;
 
 /* Why this block was taken, and how much of it was read. */
 static const char *reason_of(const explanation *e, const store_read *read) {
-    static const char *const reasons[2][5] = {
+    static const char *const reasons[3][5] = {
         {"answers eps; its centre is selected, so its bytes are walked",
          "answers eps; it only touches the region, so its index row is enough",
          "answers eps; nothing is selected inside, so its index row is enough",
@@ -158,9 +165,16 @@ static const char *reason_of(const explanation *e, const store_read *read) {
          "answers every eps and border in its reach; made in memory, for the metric is not stored, and walked",
          /* One sentence. NOLINTNEXTLINE(bugprone-suspicious-missing-comma) */
          "answers every eps and border in its reach; made in memory, for the metric is not stored; nothing is "
+         "selected inside"},
+        {"answers what the view asks for in its reach; its centre is selected, so its bytes are walked",
+         "answers what the view asks for in its reach; it is out of sight, so its index row is enough",
+         "answers what the view asks for in its reach; nothing is selected inside, so its index row is enough",
+         "answers what the view asks for in its reach; made in memory, for the metric is not stored, and walked",
+         /* One sentence. NOLINTNEXTLINE(bugprone-suspicious-missing-comma) */
+         "answers what the view asks for in its reach; made in memory, for the metric is not stored; nothing is "
          "selected inside"}};
     const int which = read->computed ? (read->needs_bytes ? 3 : 4) : read->needs_bytes ? 0 : read->outside ? 1 : 2;
-    return reasons[e->by_rule][which];
+    return reasons[e->by][which];
 }
 
 static void release_explanation(void *data) {
@@ -206,7 +220,10 @@ static void explain_column(void *data, size_t row, int column, sqlite3_context *
         sqlite3_result_int64(result, read->selected);
         break;
     case 7:
-        sqlite3_result_double(result, e->achieved_eps);
+        sqlite3_result_double(result, e->by == BY_VIEW ? e->achieved_tau : e->achieved_eps);
+        break;
+    case 8:
+        sqlite3_result_int(result, e->guaranteed);
         break;
     default:
         sqlite3_result_int64(result, (sqlite3_int64)read->number);
@@ -214,29 +231,42 @@ static void explain_column(void *data, size_t row, int column, sqlite3_context *
     }
 }
 
-int fill_explain(connection *c, sqlite3_value **arguments, row_set *rows, char **error) {
-    request r;
-    int code = request_read(c, arguments[0], arguments[1], arguments[2], arguments[3], REQUEST_COVER, &r, error);
-    if (code != SQLITE_OK) return code;
+static int explain(request *r, row_set *rows, char **error) {
     explanation *e = sqlite3_malloc(sizeof *e);
-    code = e ? SQLITE_OK : SQLITE_NOMEM;
+    int code = e ? SQLITE_OK : SQLITE_NOMEM;
     rqt_patch patch = {0};
     if (e) {
-        *e = (explanation){.lattice = r.terrain->lattice,
-                           .k = r.terrain->k,
-                           .placement = r.terrain->placement,
-                           .by_rule = r.options.rule != NULL};
-        code = request_patch(&r, RQT_PRODUCT_VERTICES, &patch, &e->reads, error);
-        e->achieved_eps = r.achieved_eps;
+        *e = (explanation){.lattice = r->terrain->lattice,
+                           .k = r->terrain->k,
+                           .placement = r->terrain->placement,
+                           .by = r->view           ? BY_VIEW
+                                 : r->options.rule ? BY_RULE
+                                                   : BY_EPS};
+        code = request_patch(r, RQT_PRODUCT_VERTICES, &patch, &e->reads, error);
+        e->achieved_eps = r->achieved_eps;
+        if (r->view) e->achieved_tau = r->view->achieved_tau, e->guaranteed = r->view->guaranteed;
     }
-    if (r.store) store_keep(r.store, &patch);
-    request_free(&r);
+    store_keep(r->store, &patch);
+    request_free(r);
     if (code != SQLITE_OK) {
         sqlite3_free(e);
         return code;
     }
     *rows = (row_set){e->reads.count, e, explain_column, release_explanation};
     return SQLITE_OK;
+}
+
+int fill_explain(connection *c, sqlite3_value **arguments, row_set *rows, char **error) {
+    request r;
+    const int code =
+        request_read(c, arguments[0], arguments[1], arguments[2], arguments[3], REQUEST_COVER, &r, error);
+    return code == SQLITE_OK ? explain(&r, rows, error) : code;
+}
+
+int fill_view_explain(connection *c, sqlite3_value **arguments, row_set *rows, char **error) {
+    request r;
+    const int code = request_read_view(c, arguments[0], arguments[1], arguments[2], &r, error);
+    return code == SQLITE_OK ? explain(&r, rows, error) : code;
 }
 
 /* -------------------------------------------------------------------------------------------- rqt_check */

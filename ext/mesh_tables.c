@@ -1,5 +1,6 @@
-/* mesh_tables.c - rqt_range, rqt_triangles, rqt_strip: one patch, three ways to say it in rows. */
-#include "functions.h"
+/* mesh_tables.c - rqt_range, rqt_triangles, rqt_strip, and rqt_view, rqt_view_triangles, rqt_view_strip: one patch,
+ * three ways to say it in rows. Functions of views have columns of their own behind those that all have. */
+#include "view.h"
 
 #include "format.h"
 
@@ -13,6 +14,9 @@ typedef struct mesh {
     double factor; /* rqt_unit_factor */
     store *store;  /* lives as long as the table does */
     double achieved_eps;
+    bool is_view;
+    double achieved_tau; /* of a view */
+    bool guaranteed;
     double *xyz; /* of each vertex, in a frame of its own; NULL: the terrain's CRS */
 } mesh;
 
@@ -70,10 +74,12 @@ static int make_cut(request *r, rqt_product product, mesh *m, char **error) {
 }
 
 /* The mesh of the arguments, not yet as rows. */
-static int make_mesh(connection *c, sqlite3_value **arguments, rqt_product product, row_set *rows, mesh **out,
-                     char **error) {
+static int make_mesh(connection *c, bool is_view, sqlite3_value **arguments, rqt_product product, row_set *rows,
+                     mesh **out, char **error) {
     request r;
-    int code = request_read(c, arguments[0], arguments[1], arguments[2], arguments[3], REQUEST_COVER, &r, error);
+    int code =
+        is_view ? request_read_view(c, arguments[0], arguments[1], arguments[2], &r, error)
+                : request_read(c, arguments[0], arguments[1], arguments[2], arguments[3], REQUEST_COVER, &r, error);
     if (code != SQLITE_OK) return code;
     mesh *m = sqlite3_malloc(sizeof *m);
     code = m ? SQLITE_OK : SQLITE_NOMEM;
@@ -86,6 +92,8 @@ static int make_mesh(connection *c, sqlite3_value **arguments, rqt_product produ
         code = r.mode == REQUEST_CUT ? make_cut(&r, product, m, error)
                                      : request_patch(&r, product, &m->patch, NULL, error);
         m->achieved_eps = r.achieved_eps;
+        m->is_view = is_view;
+        if (is_view) m->achieved_tau = r.view->achieved_tau, m->guaranteed = r.view->guaranteed;
         if (code == SQLITE_OK && r.frame) {
             code = frame_merge(r.frame, &m->patch);
             if (code == SQLITE_OK) code = frame_places(r.frame, &m->patch, &m->xyz, error);
@@ -103,18 +111,26 @@ static int make_mesh(connection *c, sqlite3_value **arguments, rqt_product produ
     return SQLITE_OK;
 }
 
-/* A vertex that is no sample of the mesh has no level, and places and heights that are not whole. */
+/* What is told of the whole mesh, in every row: achieved_eps; of a view achieved_tau and guaranteed. */
+static int told_columns(const mesh *m) {
+    return m->is_view ? 2 : 1;
+}
+
+static void put_told(const mesh *m, int which, sqlite3_context *result) {
+    if (which == 1)
+        sqlite3_result_int(result, m->guaranteed);
+    else
+        sqlite3_result_double(result, m->is_view ? m->achieved_tau : m->achieved_eps);
+}
+
+/* Of which a vertex that is no sample of the mesh has no level, and places and heights that are not whole. */
 static void cut_column(const mesh *m, size_t row, int column, sqlite3_context *result) {
     const rqt_cut_vertex *v = &m->cut.vertices[row];
     const bool is_sample = v->level >= 0;
-    if (column < 3)
-        put_coordinate(m, (uint32_t)row, column, result);
-    else if (column == 3)
+    if (column == 3)
         sqlite3_result_double(result, rqt_code_metres(v->error));
     else if (column == 4 && is_sample)
         sqlite3_result_int(result, v->level);
-    else if (column == 8)
-        sqlite3_result_double(result, m->achieved_eps);
     else if (column >= 5) {
         const double value = column == 5 ? v->col : column == 6 ? v->row : v->q;
         if (is_sample)
@@ -124,75 +140,96 @@ static void cut_column(const mesh *m, size_t row, int column, sqlite3_context *r
     }
 }
 
-static void range_column(void *data, size_t row, int column, sqlite3_context *result) {
-    const mesh *m = data;
-    if (column == 9) {
-        put_geometry(m, &(const uint32_t){(uint32_t)row}, 1, result);
-        return;
-    }
-    if (m->is_cut) {
-        cut_column(m, row, column, result);
-        return;
-    }
+static void patch_column(const mesh *m, size_t row, int column, sqlite3_context *result) {
     const rqt_patch_vertex *v = &m->patch.vertices[row];
-    if (column < 3)
-        put_coordinate(m, (uint32_t)row, column, result);
-    else if (column == 3)
+    if (column == 3)
         sqlite3_result_double(result, rqt_code_metres(v->error));
-    else if (column == 4)
-        sqlite3_result_int(result, v->level);
-    else if (column == 8)
-        sqlite3_result_double(result, m->achieved_eps);
     else
-        sqlite3_result_int(result, column == 5 ? v->col : column == 6 ? v->row : v->q);
+        sqlite3_result_int(result, column == 4 ? v->level : column == 5 ? v->col : column == 6 ? v->row : v->q);
 }
 
-int fill_range(connection *c, sqlite3_value **arguments, row_set *rows, char **error) {
+static void range_column(void *data, size_t row, int column, sqlite3_context *result) {
+    const mesh *m = data;
+    if (column < 3)
+        put_coordinate(m, (uint32_t)row, column, result);
+    else if (column == 8 + told_columns(m))
+        put_geometry(m, &(const uint32_t){(uint32_t)row}, 1, result);
+    else if (column >= 8)
+        put_told(m, column - 8, result);
+    else if (m->is_cut)
+        cut_column(m, row, column, result);
+    else
+        patch_column(m, row, column, result);
+}
+
+static int fill_vertices(connection *c, bool is_view, sqlite3_value **arguments, row_set *rows, char **error) {
     mesh *m;
-    const int code = make_mesh(c, arguments, RQT_PRODUCT_VERTICES, rows, &m, error);
+    const int code = make_mesh(c, is_view, arguments, RQT_PRODUCT_VERTICES, rows, &m, error);
     if (code != SQLITE_OK) return code;
     rows->count = m->is_cut ? m->cut.vertex_count : m->patch.vertex_count;
     rows->column = range_column;
     return SQLITE_OK;
 }
 
-static void triangles_column(void *data, size_t row, int column, sqlite3_context *result) {
-    const mesh *m = data;
-    if (column == 0)
-        sqlite3_result_int64(result, (sqlite3_int64)row + 1);
-    else if (column == 10)
-        sqlite3_result_double(result, m->achieved_eps);
-    else {
-        const uint32_t *corners = (m->is_cut ? m->cut.triangles : m->patch.triangles) + 3 * row;
-        if (column == 11)
-            put_geometry(m, corners, 3, result);
-        else
-            put_coordinate(m, corners[(column - 1) / 3], (column - 1) % 3, result);
-    }
+int fill_range(connection *c, sqlite3_value **arguments, row_set *rows, char **error) {
+    return fill_vertices(c, false, arguments, rows, error);
 }
 
-int fill_triangles(connection *c, sqlite3_value **arguments, row_set *rows, char **error) {
+int fill_view(connection *c, sqlite3_value **arguments, row_set *rows, char **error) {
+    return fill_vertices(c, true, arguments, rows, error);
+}
+
+static void triangles_column(void *data, size_t row, int column, sqlite3_context *result) {
+    const mesh *m = data;
+    const uint32_t *corners = (m->is_cut ? m->cut.triangles : m->patch.triangles) + 3 * row;
+    if (column == 0)
+        sqlite3_result_int64(result, (sqlite3_int64)row + 1);
+    else if (column < 10)
+        put_coordinate(m, corners[(column - 1) / 3], (column - 1) % 3, result);
+    else if (column == 10 + told_columns(m))
+        put_geometry(m, corners, 3, result);
+    else
+        put_told(m, column - 10, result);
+}
+
+static int fill_faces(connection *c, bool is_view, sqlite3_value **arguments, row_set *rows, char **error) {
     mesh *m;
-    const int code = make_mesh(c, arguments, RQT_PRODUCT_TRIANGLES, rows, &m, error);
+    const int code = make_mesh(c, is_view, arguments, RQT_PRODUCT_TRIANGLES, rows, &m, error);
     if (code != SQLITE_OK) return code;
     rows->count = m->is_cut ? m->cut.triangle_count : m->patch.triangle_count;
     rows->column = triangles_column;
     return SQLITE_OK;
 }
 
+int fill_triangles(connection *c, sqlite3_value **arguments, row_set *rows, char **error) {
+    return fill_faces(c, false, arguments, rows, error);
+}
+
+int fill_view_triangles(connection *c, sqlite3_value **arguments, row_set *rows, char **error) {
+    return fill_faces(c, true, arguments, rows, error);
+}
+
 static void strip_column(void *data, size_t row, int column, sqlite3_context *result) {
     const mesh *m = data;
     if (column == 0)
         sqlite3_result_int64(result, (sqlite3_int64)row);
-    else if (column == 4)
-        sqlite3_result_double(result, m->achieved_eps);
+    else if (column >= 4)
+        put_told(m, column - 4, result);
     else
         put_coordinate(m, m->patch.strip[row], column - 1, result);
 }
 
-int fill_strip(connection *c, sqlite3_value **arguments, row_set *rows, char **error) {
+static int fill_joined(connection *c, bool is_view, sqlite3_value **arguments, row_set *rows, char **error) {
     mesh *m;
-    const int code = make_mesh(c, arguments, RQT_PRODUCT_STRIP, rows, &m, error);
+    const int code = make_mesh(c, is_view, arguments, RQT_PRODUCT_STRIP, rows, &m, error);
     if (code == SQLITE_OK) rows->column = strip_column;
     return code;
+}
+
+int fill_strip(connection *c, sqlite3_value **arguments, row_set *rows, char **error) {
+    return fill_joined(c, false, arguments, rows, error);
+}
+
+int fill_view_strip(connection *c, sqlite3_value **arguments, row_set *rows, char **error) {
+    return fill_joined(c, true, arguments, rows, error);
 }

@@ -1,5 +1,6 @@
-/* request.c - region, eps, terrain and options out of SQL values: one reading of them for every function. */
-#include "functions.h"
+/* request.c - region and eps, or a camera, with terrain and options out of SQL values: one reading of them for
+ * every function. */
+#include "view.h"
 
 #include <math.h>
 #include <string.h>
@@ -49,12 +50,10 @@ static int read_region(request *r, sqlite3_value *value, char **error) {
     return status == RQT_OK ? SQLITE_OK : SQLITE_NOMEM;
 }
 
-int request_read(connection *c, sqlite3_value *region, sqlite3_value *eps, sqlite3_value *terrain,
-                 sqlite3_value *options, request_mode usual, request *r, char **error) {
-    *r = (request){.mode = usual};
-    if (!request_number(eps, "eps", &r->eps, error)) return *error ? SQLITE_ERROR : SQLITE_NOMEM;
-    if (r->eps < 0) return fail(error, "eps must be 0 or more; it is %!.15g", r->eps);
-    r->options = (store_query_options){.select = RQT_SELECT_THRESHOLD, .outline = RQT_OUTLINE_EXACT};
+/* Options and terrain; what is asked for comes next. */
+static int open(connection *c, sqlite3_value *terrain, sqlite3_value *options, request *r, char **error) {
+    r->options = (store_query_options){.select = RQT_SELECT_THRESHOLD,
+                                       .outline = r->view ? RQT_OUTLINE_TOL : RQT_OUTLINE_EXACT};
     r->achieved_eps = r->eps;
     int code = SQLITE_OK;
     if (options && sqlite3_value_type(options) != SQLITE_NULL) {
@@ -69,11 +68,34 @@ int request_read(connection *c, sqlite3_value *region, sqlite3_value *eps, sqlit
     if (code == SQLITE_OK) code = connection_store(c, &r->store, error);
     if (code == SQLITE_OK) r->connection = c;
     if (code == SQLITE_OK) code = request_terrain(r->store, terrain, &r->terrain, error);
-    if (code == SQLITE_OK) code = read_region(r, region, error);
+    return code;
+}
+
+/* What selects, when it is known what is asked for. */
+static int finish(request *r, int code, char **error) {
     if (code == SQLITE_OK) code = rule_read(r, error);
     if (code == SQLITE_OK) code = frame_read(r, error);
     if (code != SQLITE_OK) request_free(r);
     return code;
+}
+
+int request_read(connection *c, sqlite3_value *region, sqlite3_value *eps, sqlite3_value *terrain,
+                 sqlite3_value *options, request_mode usual, request *r, char **error) {
+    *r = (request){.mode = usual};
+    if (!request_number(eps, "eps", &r->eps, error)) return *error ? SQLITE_ERROR : SQLITE_NOMEM;
+    if (r->eps < 0) return fail(error, "eps must be 0 or more; it is %!.15g", r->eps);
+    int code = open(c, terrain, options, r, error);
+    if (code == SQLITE_OK) code = read_region(r, region, error);
+    return finish(r, code, error);
+}
+
+int request_read_view(connection *c, sqlite3_value *camera, sqlite3_value *terrain, sqlite3_value *options,
+                      request *r, char **error) {
+    *r = (request){.mode = REQUEST_COVER, .eps = INFINITY};
+    int code = view_create(camera, &r->view, error);
+    if (code == SQLITE_OK) code = open(c, terrain, options, r, error);
+    if (code == SQLITE_OK) code = view_place(r, error);
+    return finish(r, code, error);
 }
 
 int request_patch(request *r, rqt_product product, rqt_patch *patch, store_reads *reads, char **error) {
@@ -97,6 +119,7 @@ int32_t request_srid(const request *r) {
 void request_free(request *r) {
     frame_free(r->frame);
     rule_free(r);
+    view_free(r->view);
     rqt_region_free(r->region);
     rqt_geometry_free(r->geometry);
     if (r->connection) connection_done(r->connection);

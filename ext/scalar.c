@@ -198,39 +198,60 @@ static int patch_mesh(request *r, const mesh_format *f, uint8_t **bytes, size_t 
     return code;
 }
 
-void call_mesh(sqlite3_context *result, int count, sqlite3_value **arguments) {
+/* A request that has been read, in a format. */
+static int make_mesh(request *r, const mesh_format *f, uint8_t **bytes, size_t *size, char **error) {
+    if (r->frame && f->family != MESH_OTHER)
+        return fail(error, "format \"%s\" holds samples, not points in space: option \"frame\" must be crs",
+                    f->name);
+    if (r->frame && f->normals)
+        return fail(error, "normals are those of the terrain's CRS: option \"frame\" must be crs");
+    if (f->family != MESH_OTHER || f->normals) {
+        char what[60];
+        sqlite3_snprintf(sizeof what, what, "format \"%s%s\"", f->name, f->normals ? "+normals" : "");
+        const int code = request_refuse_cut(r, what, error);
+        if (code != SQLITE_OK) return code;
+    }
+    if (f->family == MESH_WIRE) return wire_mesh(r, f->normals, bytes, size, error);
+    if (r->mode == REQUEST_CUT) return cut_format(r, f->kind, bytes, size, error);
+    return patch_mesh(r, f, bytes, size, error);
+}
+
+static void mesh_result(sqlite3_context *result, const char *name, int code, char *error, const mesh_format *f,
+                        uint8_t *bytes, size_t size) {
+    if (code != SQLITE_OK)
+        scalar_error(result, name, code, error);
+    else if (f->family == MESH_OTHER && f->kind == FORMAT_OBJ)
+        sqlite3_result_text64(result, (const char *)bytes, size, sqlite3_free, SQLITE_UTF8);
+    else
+        sqlite3_result_blob64(result, bytes, size, sqlite3_free);
+}
+
+/* region, eps or camera; format; terrain and options as far as they are there. */
+static void call_with_format(sqlite3_context *result, bool is_view, int count, sqlite3_value **arguments) {
+    connection *c = sqlite3_user_data(result);
+    const int first = is_view ? 1 : 2; /* the place of format */
+    sqlite3_value *terrain = count > first + 1 ? arguments[first + 1] : NULL,
+                  *options = count > first + 2 ? arguments[first + 2] : NULL;
     char *error = NULL;
     request r = {0};
     mesh_format f = {MESH_OTHER, FORMAT_OBJ, false, ""};
     uint8_t *bytes = NULL;
     size_t size = 0;
-    int code = read_format(arguments[2], &f, &error);
+    int code = read_format(arguments[first], &f, &error);
     if (code == SQLITE_OK)
-        code = request_read(sqlite3_user_data(result), arguments[0], arguments[1], count > 3 ? arguments[3] : NULL,
-                            count > 4 ? arguments[4] : NULL, REQUEST_COVER, &r, &error);
-    if (code == SQLITE_OK && r.frame && f.family != MESH_OTHER)
-        code =
-            fail(&error, "format \"%s\" holds samples, not points in space: option \"frame\" must be crs", f.name);
-    if (code == SQLITE_OK && r.frame && f.normals)
-        code = fail(&error, "normals are those of the terrain's CRS: option \"frame\" must be crs");
-    if (code == SQLITE_OK && (f.family != MESH_OTHER || f.normals)) {
-        char what[60];
-        sqlite3_snprintf(sizeof what, what, "format \"%s%s\"", f.name, f.normals ? "+normals" : "");
-        code = request_refuse_cut(&r, what, &error);
-    }
-    if (code == SQLITE_OK && f.family == MESH_WIRE)
-        code = wire_mesh(&r, f.normals, &bytes, &size, &error);
-    else if (code == SQLITE_OK && r.mode == REQUEST_CUT)
-        code = cut_format(&r, f.kind, &bytes, &size, &error);
-    else if (code == SQLITE_OK)
-        code = patch_mesh(&r, &f, &bytes, &size, &error);
+        code = is_view ? request_read_view(c, arguments[0], terrain, options, &r, &error)
+                       : request_read(c, arguments[0], arguments[1], terrain, options, REQUEST_COVER, &r, &error);
+    if (code == SQLITE_OK) code = make_mesh(&r, &f, &bytes, &size, &error);
     request_free(&r);
-    if (code != SQLITE_OK)
-        scalar_error(result, "rqt_mesh", code, error);
-    else if (f.family == MESH_OTHER && f.kind == FORMAT_OBJ)
-        sqlite3_result_text64(result, (const char *)bytes, size, sqlite3_free, SQLITE_UTF8);
-    else
-        sqlite3_result_blob64(result, bytes, size, sqlite3_free);
+    mesh_result(result, is_view ? "rqt_view_mesh" : "rqt_mesh", code, error, &f, bytes, size);
+}
+
+void call_mesh(sqlite3_context *result, int count, sqlite3_value **arguments) {
+    call_with_format(result, false, count, arguments);
+}
+
+void call_view_mesh(sqlite3_context *result, int count, sqlite3_value **arguments) {
+    call_with_format(result, true, count, arguments);
 }
 
 void call_height(sqlite3_context *result, int count, sqlite3_value **arguments) {

@@ -513,9 +513,9 @@ static void places_in_space_are_the_textbooks(void **state) {
     (void)state;
     start_dice(16);
     geo_frame *ecef, *enu;
-    assert_int_equal(geo_frame_create(GEO_ECEF, 0, 0, 0, &ecef, NULL, 0), GEO_OK);
+    assert_int_equal(geo_frame_create(GEO_ECEF, &wgs84, 0, 0, 0, &ecef, NULL, 0), GEO_OK);
     const double origin[3] = {dice(-180, 180), dice(-89, 89), 0};
-    assert_int_equal(geo_frame_create(GEO_ENU, origin[0], origin[1], 0, &enu, NULL, 0), GEO_OK);
+    assert_int_equal(geo_frame_create(GEO_ENU, &wgs84, origin[0], origin[1], 0, &enu, NULL, 0), GEO_OK);
     double o[3];
     textbook_ecef(origin, o);
     for (int n = 0; n < 1000; n++) {
@@ -549,7 +549,7 @@ static void F29_flat_triangles_are_off_by_no_more_than_the_bound(void **state) {
     for (int n = 0; n < 400; n++) {
         geo_frame *f;
         const int geoid = n % 4 == 3;
-        assert_int_equal(geo_frame_create(GEO_ECEF, 0, 0, geoid, &f, NULL, 0), GEO_OK);
+        assert_int_equal(geo_frame_create(GEO_ECEF, &wgs84, 0, 0, geoid, &f, NULL, 0), GEO_OK);
         const double step = n % 3 == 0 ? 1.0 / 3600 : n % 3 == 1 ? 0.01 : 0.5, samples = 8 + floor(dice(0, 120));
         geo_extent e = {.west = dice(-180, 180), .lon_step = step * dice(0.5, 2), .lat_step = step};
         e.south = dice(-90, 90 - samples * e.lat_step);

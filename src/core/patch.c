@@ -5,6 +5,7 @@
  * when it ends for what it has added. Where the raster ends two lattice vertices may be one sample; there each
  * corner goes through the table. Samples of one patch are told apart by (col,row) alone.
  */
+#include "rule.h"
 #include "walk.h"
 
 /* ----------------------------------------------------------------------------------------------- scratch */
@@ -29,7 +30,9 @@ static void drop_block_arrays(rqt_scratch *s) {
     memory_drop(&s->allocator, s->memo);
     memory_drop(&s->allocator, s->order);
     memory_drop(&s->allocator, s->border);
+    memory_drop(&s->allocator, s->limits);
     s->chosen = NULL;
+    s->limits = NULL;
     s->memo = s->order = NULL;
     s->border = NULL;
     s->k = -1;
@@ -105,9 +108,18 @@ static bool take_block_arrays(rqt_scratch *s, int k) {
     return true;
 }
 
+static bool take_limits(rqt_scratch *s, size_t vertices) {
+    if (!s->limits) s->limits = memory_take(&s->allocator, (vertices + rule_limits_room(s->k)) * sizeof *s->limits);
+    return s->limits != NULL;
+}
+
 bool patch_begin(walk *w) {
     rqt_scratch *s = w->scratch;
     if (!take_block_arrays(s, w->query->k)) return false;
+    if (w->query->rule && rule_field(w->query->rule)) {
+        if (!take_limits(s, (size_t)w->n * (size_t)w->n)) return false;
+        w->limits = s->limits;
+    }
     w->chosen = s->chosen;
     w->memo = s->memo;
     w->order = s->order;

@@ -13,6 +13,8 @@
 #ifndef RQT_VIEW_H
 #define RQT_VIEW_H
 
+#include "rqt.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -28,37 +30,44 @@ typedef struct rqt_camera {
 } rqt_camera;
 
 /* A camera at `eye` that looks along `direction` (any length but 0), rolled so that `vertical` (any length but 0)
- * points upward in the picture; where the two are parallel, `ahead` does instead (and gives way to any other
- * direction where it is parallel too). fovy: degrees, 0 < fovy < 180. Everything else is taken as it is: near, far,
- * width, height, tau must have been set. RQT_INVALID, with a sentence, when the camera is none. */
+ * points upward in the picture; where the two are parallel (to 10^-9), `ahead` does instead (any length but 0), and
+ * gives way to any other direction where it is parallel too. fovy: degrees, 0 < fovy < 180. Everything else is
+ * taken as it is: near, far, width, height, tau must have been set. RQT_INVALID, with a sentence, when the camera
+ * is none: an eye or a direction that is not finite, 0 pixels, a tau that is not above 0, near >= far, a fovy so
+ * small that focal overflows. */
 rqt_status rqt_camera_look(rqt_camera *camera, const double eye[3], const double direction[3],
                            const double vertical[3], const double ahead[3], double fovy, rqt_message *message);
 
 /* Where a point of the scene is in the picture: x to the right, y downward, pixels, (0,0) the upper left corner.
- * false: it is not drawn, for its depth is not in near .. far, or 0; or it is outside the picture (then xy is set).
- */
+ * False when it is not drawn: its depth is not in near .. far, or not above 0, or it is outside the picture. xy is
+ * its place in the (infinite) picture plane whenever its depth is above 0, drawn or not; else not a number. */
 bool rqt_camera_project(const rqt_camera *camera, const double point[3], double xy[2]);
 
 /* A piece of the scene: all points p with |(p - centre) . up| <= half_height, and the rest of p - centre no longer
- * than radius. At every point in it the direction in which heights are counted makes an angle of at most `tilt`
- * (radians, 0 .. pi) with up. */
+ * than radius. It must hold the samples of its ground; whoever computes it in doubles makes it larger by what that
+ * rounds. Where radius is large against the planet, up is no vertical any more: half_height has to cover that. */
 typedef struct rqt_prism {
     double centre[3], up[3]; /* up: unit */
-    double radius, half_height, tilt;
+    double radius, half_height;
 } rqt_prism;
 
 /* What the tolerance allows the terrain whose samples are all in a piece. */
 typedef struct rqt_view_bound {
-    double eps;      /* metres of the scene: how far the mesh may be from a sample there */
-    bool shown;      /* may something of the mesh there be drawn, with that eps? */
+    double eps;      /* metres of the scene: how far the mesh may be from a sample there; never not a number */
+    bool shown;      /* false: nothing of the terrain there, nor of a mesh within eps of it, is drawn */
     double distance; /* a lower bound of how far the samples are from the eye */
-    double share;    /* of the eps that the piece as a whole costs against its best point, 0 .. 1: 1 is nothing; a
-                        square    with a small share is worth splitting */
+    double share;    /* 0 .. 1: eps over the most that any part of the piece could get. What is less than 1 was lost
+                        to the piece's being large: against its distance, sideways or upward, across the frustum's
+                        border, or in its angle to the axis. Well below 1 it is worth splitting; at 1 nothing is to
+                        be won. Where nothing is shown: over the most that could be of use, what drawn pieces as far
+                        away as its farthest point have. 0 around an eye, whatever the size: stop somewhere. */
 } rqt_view_bound;
 
-/* The guaranteed test. For every sample S of the piece and every mesh with a point M with |S - M| <= eps: when S or
- * M is drawn (near .. far, inside the picture), their places in the picture (of the infinite picture plane; both
- * have a depth > 0) are at most tau apart. eps is infinite where none of both can be drawn. */
+/* The guaranteed test. For every point S of the piece and every point M of a mesh with |S - M| <= eps, in any
+ * direction: when S or M is drawn (near .. far, inside the picture), their places in the picture (of the infinite
+ * picture plane; both have a depth > 0) are at most tau apart. Where nothing is drawn eps says how far M has to
+ * stay from the frustum: it is finite, but large beside what is drawn. Of use are cameras of rqt_camera_look;
+ * numbers that are not finite, or too large to be squared, give eps 0. */
 void rqt_view_tolerance(const rqt_camera *camera, const rqt_prism *prism, rqt_view_bound *bound);
 
 /* ---------------------------------------------------------------------------------------------- other tests --

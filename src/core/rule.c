@@ -31,6 +31,7 @@
  *
  * Thresholds are not stored. A question about one vertex goes through a tree of the places' boxes and stops at the
  * first place that selects it. */
+#include "field.h"
 #include "region_edges.h"
 #include "rule.h"
 
@@ -52,8 +53,9 @@ struct rqt_rule {
     int32_t base[RQT_RANKS]; /* the threshold where there is no place, by rank */
     kept_place *places;
     size_t place_count;
-    region_box *nodes;     /* the tree of the places' boxes */
-    rqt_selection *forced; /* closed; NULL: none */
+    region_box *nodes;      /* the tree of the places' boxes */
+    const rqt_field *field; /* NULL: none */
+    rqt_selection *forced;  /* closed; NULL: none */
 };
 
 /* ----------------------------------------------------------------------------------------------- making -- */
@@ -173,6 +175,12 @@ rqt_status rqt_rule_set_places(rqt_rule *rule, const rqt_rule_place *places, siz
     return RQT_OK;
 }
 
+rqt_status rqt_rule_set_field(rqt_rule *rule, const rqt_field *field) {
+    if (field && !field_is_over(field, &rule->lattice)) return RQT_INVALID;
+    rule->field = field;
+    return RQT_OK;
+}
+
 rqt_status rqt_rule_force(rqt_rule *rule, rqt_vertex v) {
     const int32_t side = 1 << rule->lattice.K;
     if (v.x < 0 || v.y < 0 || v.x > side || v.y > side) return RQT_INVALID;
@@ -195,9 +203,22 @@ static int32_t code_at(const rqt_rule *rule, const kept_place *p, int rank) {
     return rule->lowers ? lowered_code(p->eps, rule->lowering[rank], rule->quantum_error) : p->code;
 }
 
+int32_t rule_field_threshold(const rqt_rule *rule, rqt_code code, int rank) {
+    const int32_t lowered = lowered_code(rqt_code_metres(code), rule->lowering[rank], rule->quantum_error);
+    return lowered < rule->base[rank] ? lowered : rule->base[rank];
+}
+
+/* By the rule's own eps and the field. */
+static int32_t threshold_without_places(const rqt_rule *rule, rqt_vertex v, int rank) {
+    if (!rule->field) return rule->base[rank];
+    const int32_t half = (rank & 1 ? 3 : 2) << rank / 2;
+    return rule_field_threshold(rule, field_least(rule->field, v.x - half, v.y - half, v.x + half, v.y + half),
+                                rank);
+}
+
 int32_t rqt_rule_threshold(const rqt_rule *rule, rqt_vertex v) {
     const int rank = rqt_vertex_rank(&rule->lattice, v);
-    int32_t least = rule->base[rank];
+    int32_t least = threshold_without_places(rule, v, rank);
     const region_box reach = reach_of(v, rank);
     region_search s;
     region_search_begin(&s, rule->nodes, rule->place_count, &reach);
@@ -216,6 +237,7 @@ bool rqt_rule_selects(const rqt_rule *rule, rqt_vertex v, rqt_code error, bool o
     const int rank = rqt_vertex_rank(&rule->lattice, v);
     if (outline || error > rule->base[rank]) return true;
     if (is_forced(rule, v)) return true;
+    if (error > threshold_without_places(rule, v, rank)) return true;
     const region_box reach = reach_of(v, rank);
     region_search s;
     region_search_begin(&s, rule->nodes, rule->place_count, &reach);
@@ -231,17 +253,31 @@ const rqt_lattice *rule_lattice(const rqt_rule *rule) {
     return &rule->lattice;
 }
 
-/* A place that holds the whole cell meets every box in it. */
+const rqt_field *rule_field(const rqt_rule *rule) {
+    return rule->field;
+}
+
+bool rule_lowers(const rqt_rule *rule) {
+    return rule->lowers;
+}
+
+/* A place or square that holds the whole cell meets every box in it. */
 rule_range rule_range_below(const rqt_rule *rule, rqt_vertex centre) {
     const int rank = rqt_vertex_rank(&rule->lattice, centre);
     const int32_t half = 1 << rank / 2;
     const region_box reach = reach_of(centre, rank);
     rule_range range = {
         .least = rqt_rule_threshold(rule, centre), .most = rule->base[0], .forced = is_forced(rule, centre)};
+    if (rule->field) {
+        const rqt_code square =
+            field_holding(rule->field, centre.x - half, centre.y - half, centre.x + half, centre.y + half);
+        range.most = rule_field_threshold(rule, square, 0);
+    }
     region_search s;
     region_search_begin(&s, rule->nodes, rule->place_count, &reach);
     for (size_t i; region_search_next(&s, &i);) {
         const int32_t code = code_at(rule, &rule->places[i], 0);
+        range.places = true;
         if (code < range.most && region_area_relation(rule->places[i].region, centre.x - half, centre.y - half,
                                                       centre.x + half, centre.y + half) == RQT_INSIDE)
             range.most = code;

@@ -52,8 +52,22 @@ static uint8_t choose_by_error(const rqt_block *b, size_t count, rqt_code eps, u
     return all;
 }
 
-/* The same where vertices have thresholds of their own: down from the block's centre, as far as they are selected.
- */
+/* The same where each vertex has a limit of its own: chosen = error >= limit or a flag of the mask. */
+VECTOR_CLONES
+static uint8_t choose_by_limits(const rqt_block *b, size_t count, const uint16_t *restrict limits, uint8_t mask,
+                                uint8_t *chosen) {
+    const rqt_code *restrict const error = b->error;
+    const uint8_t *restrict const flags = b->flags;
+    uint8_t *restrict const out = chosen;
+    uint8_t all = 0xFF;
+    for (size_t i = 0; i < count; i++) {
+        out[i] = (uint8_t)((error[i] >= limits[i]) | ((flags[i] & mask) != 0));
+        all &= (uint8_t)(flags[i] | (out[i] - 1));
+    }
+    return all;
+}
+
+/* Where places or forced vertices are near: down from the block's centre, as far as they are selected. */
 typedef struct choosing {
     const walk *w;
     rule_range range;
@@ -87,6 +101,11 @@ static uint8_t choose_by_rule(const walk *w, uint8_t mask) {
     choosing c = {w, rule_range_below(w->query->rule, centre), mask, 0xFF};
     if (c.range.least == c.range.most && c.range.least >= 0 && !c.range.forced)
         return choose_by_error(w->block, (size_t)n * n, (rqt_code)c.range.least, mask, w->chosen);
+    if (w->limits && !c.range.places && !c.range.forced) {
+        rule_limits(w->query->rule, &w->place, w->query->k, w->limits, w->limits + (size_t)n * n);
+        for (int i = 0; i < 4; i++) w->limits[corners[i]] = RQT_CODE_INFINITY;
+        return choose_by_limits(w->block, (size_t)n * n, w->limits, mask, w->chosen);
+    }
     memset(w->chosen, 0, (size_t)n * n);
     /* The diagonal from one corner to the one across; query.c has the same cases. */
     const int from = w->place.level == 0 ? 0 : (w->place.i & 1) | (w->place.j & 1) << 1;

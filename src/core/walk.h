@@ -45,6 +45,7 @@ struct rqt_scratch {
     uint8_t *chosen;
     uint32_t *memo, *order;
     border_vertex *border;
+    uint16_t *limits; /* for rules with a field, and room for rule_limits behind them; NULL: none has come yet */
     shared_vertex *table;
     size_t table_size;
     uint32_t stamp;
@@ -73,6 +74,7 @@ typedef struct walk {
     int n;                  /* vertices a side */
     uint64_t inverse;       /* place * inverse >> 32 is place / n */
     uint8_t *chosen;        /* n * n: selected? */
+    uint16_t *limits;       /* n * n, and rule_limits_room; NULL: the query has no rule with a field */
     uint32_t *memo;         /* n * n */
     uint32_t live;
     uint32_t *order; /* places of the vertices that this block adds; their records are written when it is done */

@@ -58,12 +58,15 @@ struct relief {
 
 struct geo_frame {
     geo_frame_kind kind;
+    geo_ellipsoid ellipsoid;
+    GeographicLib::Geocentric geocentric;
     GeographicLib::LocalCartesian local;
     PJ_CONTEXT *context;
     PJ *geoid; /* NULL: heights are the ellipsoid's */
 
-    geo_frame(geo_frame_kind k, double lon, double lat)
-        : kind(k), local(lat, lon, 0), context(nullptr), geoid(nullptr) {}
+    geo_frame(geo_frame_kind k, const geo_ellipsoid &e, double lon, double lat)
+        : kind(k), ellipsoid(e), geocentric(e.a, e.f), local(lat, lon, 0, geocentric), context(nullptr),
+          geoid(nullptr) {}
     ~geo_frame() {
         proj_destroy(geoid);
         proj_context_destroy(context);
@@ -122,11 +125,11 @@ struct geo_frame {
     }
 };
 
-extern "C" int geo_frame_create(geo_frame_kind kind, double lon, double lat, int geoid, geo_frame **out,
-                                char *message, int message_size) {
+extern "C" int geo_frame_create(geo_frame_kind kind, const geo_ellipsoid *ellipsoid, double lon, double lat,
+                                int geoid, geo_frame **out, char *message, int message_size) {
     *out = nullptr;
     return geo_guard(message, message_size, [&] {
-        geo_frame *frame = new geo_frame(kind, lon, lat);
+        geo_frame *frame = new geo_frame(kind, *ellipsoid, lon, lat);
         try {
             if (geoid) frame->open_geoid();
         } catch (...) {
@@ -145,22 +148,33 @@ extern "C" void geo_frame_place(const geo_frame *frame, const double lonlath[3],
     const double lon = lonlath[0], lat = lonlath[1];
     const double h = lonlath[2] + (frame->geoid ? frame->undulation(lon, lat) : 0);
     if (frame->kind == GEO_ECEF)
-        GeographicLib::Geocentric::WGS84().Forward(lat, lon, h, xyz[0], xyz[1], xyz[2]);
+        frame->geocentric.Forward(lat, lon, h, xyz[0], xyz[1], xyz[2]);
     else
         frame->local.Forward(lat, lon, h, xyz[0], xyz[1], xyz[2]);
 }
 
+extern "C" void geo_frame_lonlath(const geo_frame *frame, const double xyz[3], double lonlath[3]) {
+    double lon, lat, h;
+    if (frame->kind == GEO_ECEF)
+        frame->geocentric.Reverse(xyz[0], xyz[1], xyz[2], lat, lon, h);
+    else
+        frame->local.Reverse(xyz[0], xyz[1], xyz[2], lat, lon, h);
+    lonlath[0] = lon;
+    lonlath[1] = lat;
+    lonlath[2] = h - (frame->geoid ? frame->undulation(lon, lat) : 0);
+}
+
 extern "C" void geo_frame_sag(const geo_frame *frame, const geo_extent *e, int ranks, double *metres) {
-    const geo_ellipsoid wgs84 = GEO_WGS84;
-    const double e2 = wgs84.f * (2 - wgs84.f);
+    const geo_ellipsoid &ellipsoid = frame->ellipsoid;
+    const double e2 = ellipsoid.f * (2 - ellipsoid.f);
     const double least_lat =
         e->south <= 0 && e->north >= 0 ? 0 : std::min(std::fabs(e->south), std::fabs(e->north));
     const double most_lat = std::min(90.0, std::max(std::fabs(e->south), std::fabs(e->north)));
     const double cosine = std::cos(least_lat * DEGREE), sine = std::sin(most_lat * DEGREE);
-    const double w2 = 1 - e2 * sine * sine, n = wgs84.a / std::sqrt(w2), m = n * (1 - e2) / w2;
+    const double w2 = 1 - e2 * sine * sine, n = ellipsoid.a / std::sqrt(w2), m = n * (1 - e2) / w2;
     const double h = std::max(std::fabs(e->lowest), std::fabs(e->highest)) + (frame->geoid ? GEOID_HIGHEST : 0);
     const double A = (n + h) * cosine, C = (m + h) * sine;
-    const double B = std::hypot(m + h, 1.5 * wgs84.a * e2 / (w2 * w2 * std::sqrt(w2)));
+    const double B = std::hypot(m + h, 1.5 * ellipsoid.a * e2 / (w2 * w2 * std::sqrt(w2)));
     const relief geoid = frame->measure(*e);
     const double heights = e->highest - e->lowest + geoid.high - geoid.low;
     const double widest = (e->east - e->west) * DEGREE, tallest = (e->north - e->south) * DEGREE;

@@ -100,11 +100,13 @@ typedef struct geo_extent {
 
 /* geoid: heights are above EGM96, which PROJ's grid egm96_15.gtx tells (refused when it is not there); else above
  * the ellipsoid. The origin of GEO_ENU is (lon,lat), height 0. */
-int geo_frame_create(geo_frame_kind kind, double lon, double lat, int geoid, geo_frame **out, char *message,
-                     int message_size);
+int geo_frame_create(geo_frame_kind kind, const geo_ellipsoid *ellipsoid, double lon, double lat, int geoid,
+                     geo_frame **out, char *message, int message_size);
 void geo_frame_free(geo_frame *frame);
 /* Finite, unless the geoid has no value there. */
 void geo_frame_place(const geo_frame *frame, const double lonlath[3], double xyz[3]);
+/* Back. */
+void geo_frame_lonlath(const geo_frame *frame, const double xyz[3], double lonlath[3]);
 
 /* How far a mesh in space may be from what it is in lon,lat,height: for each rank of split vertices (2 * scale for
  * the midpoint of a side of 2^(scale+1) samples, 2 * scale + 1 for the centre of such a square), an upper bound, in

@@ -130,6 +130,13 @@ int store_normals(store *s, const store_terrain *t, const rqt_patch *patch, floa
 int store_height(store *s, const store_terrain *t, double x, double y, double eps, double *metres, bool *found,
                  char **error);
 
+/* Between which heights the samples are, metres, from what is known without reading a block (relief.c has the
+ * proof): of the whole terrain; and of a block's cell, for which range comes with that of the cell around it (or of
+ * all) and is narrowed. Between store_begin and store_end. SQLITE_CORRUPT_VTAB when the two have nothing in common.
+ */
+void store_relief_of_all(const store_terrain *t, double range[2]);
+int store_relief(store *s, const store_terrain *t, rqt_block_number number, double range[2], char **error);
+
 /* How far check has come, and what it found: severity (so far always "error"), block 0 when it is not about one. */
 typedef struct store_finding {
     const char *severity;

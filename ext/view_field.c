@@ -1,0 +1,149 @@
+/* view_field.c - what a camera allows each square of a terrain: the field, and what of the ground may be seen.
+ *
+ * From the root down, a square's heights come from the summaries of the store (store_relief), as far as there are
+ * blocks of its size, and from the square around it below. Its prism and the test give its eps. A square is cut
+ * into quarters while that pays: while what it costs as a whole (eps at its worst point, used for all of it) is
+ * well below what its parts would be allowed, or while it is neither wholly in the picture nor wholly outside.
+ *
+ * The squares that may be seen are the region of the query: rings of one polygon in samples, the sides of
+ * neighbours cancel (region_snap.c does the same). What is elsewhere cannot be drawn. */
+#include "view.h"
+
+#include <math.h>
+#include <string.h>
+
+/* Of the eps at a square's best point, what it may cost as a whole without being cut. */
+#define SHARE_WORTH_SPLITTING 0.92
+
+typedef struct square_list {
+    rqt_square *items;
+    size_t count, capacity;
+} square_list;
+
+typedef struct builder {
+    const view *view;
+    store *store;
+    const store_terrain *terrain;
+    double range[RQT_MAX_K + 1][2]; /* heights of the square at hand and of those around it, by level */
+    square_list shown;
+    int code;
+    char **error;
+} builder;
+
+/* --------------------------------------------------------------------------------------------- what is seen -- */
+
+static bool add_square(square_list *list, rqt_square square) {
+    if (list->count == list->capacity) {
+        const size_t more = list->capacity ? 2 * list->capacity : 256;
+        rqt_square *items = sqlite3_realloc64(list->items, more * sizeof *items);
+        if (!items) return false;
+        list->items = items;
+        list->capacity = more;
+    }
+    list->items[list->count++] = square;
+    /* Squares come in Morton order: four brothers are the last four. */
+    while (list->count >= 4) {
+        const rqt_square *last = list->items + list->count - 4;
+        const int32_t side = last[0].side, two = 2 * side;
+        if (last[0].x % two != 0 || last[0].y % two != 0) break;
+        bool brothers = true;
+        for (int i = 0; i < 4; i++)
+            brothers &= last[i].side == side && last[i].x == last[0].x + (i & 1 ? side : 0) &&
+                        last[i].y == last[0].y + (i & 2 ? side : 0);
+        if (!brothers) break;
+        list->count -= 3;
+        list->items[list->count - 1].side = two;
+    }
+    return true;
+}
+
+static void put_number(uint8_t **p, const void *bytes, size_t n) {
+    memcpy(*p, bytes, n);
+    *p += n;
+}
+
+/* As well-known binary: POLYGON, in samples. */
+static uint8_t *rings_of(const square_list *list, const rqt_lattice *lattice, size_t *size) {
+    static const uint32_t polygon = 3, corners = 5;
+    static const uint8_t little = 1;
+    uint8_t *bytes = sqlite3_malloc64(9 + list->count * (4 + 5 * 16)), *p = bytes;
+    if (!bytes) return NULL;
+    const uint16_t one = 1;
+    const uint8_t order = *(const uint8_t *)&one == 1 ? little : 0;
+    uint32_t rings = 0;
+    put_number(&p, &order, 1);
+    put_number(&p, &polygon, 4);
+    p += 4;
+    for (size_t i = 0; i < list->count; i++) {
+        const rqt_square *s = &list->items[i];
+        const double x0 = s->x, y0 = s->y;
+        const double x1 = fmin(s->x + s->side, lattice->width - 1), y1 = fmin(s->y + s->side, lattice->height - 1);
+        if (x1 <= x0 || y1 <= y0) continue; /* no triangle has an area there */
+        const double ring[10] = {x0, y0, x1, y0, x1, y1, x0, y1, x0, y0};
+        put_number(&p, &corners, 4);
+        put_number(&p, ring, sizeof ring);
+        rings++;
+    }
+    memcpy(bytes + 5, &rings, 4);
+    *size = (size_t)(p - bytes);
+    return bytes;
+}
+
+static int region_of(const square_list *list, const store_terrain *t, rqt_region **region) {
+    static const rqt_placement samples = {0, 0, 1, 1};
+    rqt_geometry *geometry = NULL;
+    rqt_message why;
+    size_t size;
+    uint8_t *bytes = rings_of(list, &t->lattice, &size);
+    rqt_status status = RQT_NO_MEMORY;
+    if (bytes) status = rqt_geometry_parse(bytes, size, false, store_allocator(), &geometry, &why);
+    if (status == RQT_OK) status = rqt_region_create(geometry, &samples, &t->lattice, store_allocator(), region);
+    rqt_geometry_free(geometry);
+    sqlite3_free(bytes);
+    return status == RQT_OK ? SQLITE_OK : SQLITE_NOMEM;
+}
+
+/* --------------------------------------------------------------------------------------------------- field -- */
+
+static int find_range(builder *b, rqt_square square, int level) {
+    const store_terrain *t = b->terrain;
+    rqt_block_place place;
+    if (level == 0)
+        store_relief_of_all(t, b->range[0]);
+    else
+        memcpy(b->range[level], b->range[level - 1], sizeof b->range[level]);
+    const rqt_block_number number = rqt_block_number_of(level, square.x / square.side, square.y / square.side);
+    if (level > t->lattice.K - t->k || rqt_block_locate(&t->lattice, t->k, number, &place) != RQT_OK)
+        return SQLITE_OK;
+    return store_relief(b->store, t, number, b->range[level], b->error);
+}
+
+static rqt_field_step decide(void *context, rqt_square square, double *eps) {
+    builder *b = context;
+    const view *v = b->view;
+    const rqt_lattice *lattice = &b->terrain->lattice;
+    int level = lattice->K;
+    while (square.side >> (lattice->K - level) > 1) level--;
+    b->code = find_range(b, square, level);
+    if (b->code != SQLITE_OK) return RQT_FIELD_FAIL;
+    const rqt_vertex end = rqt_vertex_clamp(lattice, (rqt_vertex){square.x + square.side, square.y + square.side});
+    rqt_prism prism;
+    rqt_view_bound bound;
+    scene_prism(&v->scene, square.x, square.y, end.x, end.y, b->range[level], &prism);
+    rqt_view_tolerance(&v->camera, &prism, &bound);
+    if (bound.share < SHARE_WORTH_SPLITTING && square.side > 1) return RQT_FIELD_SPLIT;
+    *eps = bound.eps / v->scene.exaggeration;
+    if (!bound.shown || add_square(&b->shown, square)) return RQT_FIELD_LEAF;
+    b->code = SQLITE_NOMEM;
+    return RQT_FIELD_FAIL;
+}
+
+int view_field(const request *r, view *v, rqt_region **region, char **error) {
+    builder b = {.view = v, .store = r->store, .terrain = r->terrain, .error = error};
+    const rqt_status status = rqt_field_create(&r->terrain->lattice, store_allocator(), decide, &b, &v->field);
+    int code = status == RQT_READ_FAILED ? b.code : status == RQT_OK ? SQLITE_OK : SQLITE_NOMEM;
+    if (status == RQT_INVALID) code = fail(error, "camera: what it sees cannot be worked out");
+    if (code == SQLITE_OK) code = region_of(&b.shown, r->terrain, region);
+    sqlite3_free(b.shown.items);
+    return code;
+}
