@@ -12,7 +12,7 @@ SANITIZE ?=
 # No fused multiply-adds: the same input gives the same bytes on every machine.
 CFLAGS += -std=gnu11 -g $(OPTIMIZE) $(WARNINGS) -fPIC -ffp-contract=off -fvisibility=hidden -MMD -MP $(SANITIZE)
 CXXFLAGS += -std=c++17 -g $(OPTIMIZE) $(WARNINGS) -fPIC -ffp-contract=off -fvisibility=hidden -MMD -MP $(SANITIZE)
-INCLUDES = -Isrc/core -Isrc/store -Isrc/geo -Isrc/verify -Isrc/format -Isrc/import -Iext -I$(BUILD)/generated
+INCLUDES = -Isrc/core -Isrc/store -Isrc/geo -Isrc/verify -Isrc/format -Isrc/import -Isrc/serve -Iext -I$(BUILD)/generated
 
 CORE = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/core/*.c))
 PLAIN = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/verify/*.c src/format/*.c))
@@ -21,12 +21,15 @@ SQL_SOURCES = $(wildcard src/store/*.c ext/*.c)
 SQL_HOSTED = $(patsubst %.c,$(BUILD)/hosted/%.o,$(SQL_SOURCES))
 SQL_LINKED = $(patsubst %.c,$(BUILD)/linked/%.o,$(SQL_SOURCES))
 IMPORT = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/import/*.c))
+SERVE = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/serve/*.c)) $(BUILD)/generated/web_files.o
 CLI = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/cli/*.c))
+# What the query service has in it: the page, and what it says of itself.
+WEB_FILES = $(wildcard src/serve/web/*) src/serve/openapi.json
 GENERATED = $(BUILD)/generated/schema_sql.h
 
 LIBS_CORE = -lzstd -lm
 LIBS_EXT = -lGeographicLib -lgeos_c -lproj -lcjson $(LIBS_CORE)
-LIBS_CLI = $(LIBS_EXT) -lsqlite3 $(shell gdal-config --libs 2>/dev/null) $(shell pkg-config --libs cairo libpng 2>/dev/null) -lpthread -lstdc++
+LIBS_CLI = $(LIBS_EXT) -lsqlite3 $(shell gdal-config --libs 2>/dev/null) $(shell pkg-config --libs cairo libpng 2>/dev/null) -lmicrohttpd -lz -lpthread -lstdc++
 GDAL_CFLAGS = $(shell gdal-config --cflags 2>/dev/null)
 CAIRO_CFLAGS = $(shell pkg-config --cflags cairo libpng 2>/dev/null)
 
@@ -47,7 +50,7 @@ $(BUILD)/librqt.a: $(CORE)
 $(BUILD)/rqt.so: $(SQL_HOSTED) $(PLAIN) $(GEO) $(BUILD)/librqt.a ext/exports.map
 	@echo "  link $@"; $(CXX) $(SANITIZE) -shared -Wl,--version-script=ext/exports.map -Wl,-z,defs -o $@ $(SQL_HOSTED) $(PLAIN) $(GEO) $(BUILD)/librqt.a $(LIBS_EXT)
 
-$(BUILD)/rqt: $(CLI) $(SQL_LINKED) $(IMPORT) $(PLAIN) $(GEO) $(BUILD)/librqt.a
+$(BUILD)/rqt: $(CLI) $(SERVE) $(SQL_LINKED) $(IMPORT) $(PLAIN) $(GEO) $(BUILD)/librqt.a
 	@echo "  link $@"; $(CXX) $(SANITIZE) -o $@ $^ $(LIBS_CLI)
 
 $(BUILD)/hosted/%.o: %.c $(GENERATED)
@@ -59,6 +62,14 @@ $(BUILD)/linked/%.o: %.c $(GENERATED)
 $(BUILD)/import/%.o: src/import/%.c
 	@mkdir -p $(@D)
 	@echo "  compile $<"; $(CC) $(CFLAGS) $(INCLUDES) -DSQLITE_CORE $(GDAL_CFLAGS) -c $< -o $@
+$(BUILD)/serve/%.o: src/serve/%.c
+	@mkdir -p $(@D)
+	@echo "  compile $<"; $(CC) $(CFLAGS) $(INCLUDES) -DSQLITE_CORE -c $< -o $@
+$(BUILD)/generated/web_files.c: src/serve/embed.sh $(WEB_FILES)
+	@mkdir -p $(@D)
+	@./src/serve/embed.sh $(WEB_FILES) > $@
+$(BUILD)/generated/web_files.o: $(BUILD)/generated/web_files.c
+	@$(CC) $(CFLAGS) $(INCLUDES) -c $< -o $@
 $(BUILD)/cli/%.o: src/cli/%.c $(GENERATED)
 	@mkdir -p $(@D)
 	@echo "  compile $<"; $(CC) $(CFLAGS) $(INCLUDES) -DSQLITE_CORE $(CAIRO_CFLAGS) -c $< -o $@

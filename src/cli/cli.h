@@ -24,7 +24,7 @@ typedef struct cli_command {
 } cli_command;
 
 extern const cli_command command_import, command_update, command_info, command_check, command_verify, command_mesh,
-    command_chart;
+    command_serve, command_chart;
 
 /* ------------------------------------------------------------------------------------ sentences (main.c) -- */
 /* The command whose name goes before every sentence. */
