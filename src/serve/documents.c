@@ -171,23 +171,41 @@ static bool add_terrains(database *d, request *r, cJSON *collections) {
     return false;
 }
 
+/* What is wrong with a database, instead of its terrains. */
+static void add_problem(const database *d, request *r, cJSON *problems) {
+    buffer *b = &r->answer.body;
+    buffer_add(b, "", 1);
+    cJSON *told = b->bytes ? cJSON_Parse(b->bytes) : NULL;
+    cJSON *problem = cJSON_CreateObject();
+    cJSON_AddStringToObject(problem, "database", database_label(d));
+    cJSON_AddItemToObject(problem, "detail", cJSON_DetachItemFromObject(told, "detail"));
+    cJSON_AddItemToArray(problems, problem);
+    cJSON_Delete(told);
+}
+
+/* One database that cannot be asked does not hide the others; all of them do. */
 void answer_collections(worker *w, request *r) {
     cJSON *page = cJSON_CreateObject(), *links = cJSON_AddArrayToObject(page, "links"),
-          *collections = cJSON_AddArrayToObject(page, "collections");
-    add_link(links, "self", JSON, "this document", "/collections");
+          *collections = cJSON_AddArrayToObject(page, "collections"), *problems = cJSON_CreateArray();
     uint64_t state = STATE_OF_PROGRAM;
-    bool ok = true;
-    for (int i = 0; i < w->database_count && ok; i++) {
+    add_link(links, "self", JSON, "this document", "/collections");
+    for (int i = 0; i < w->database_count; i++) {
         database *d = databases_at(w->databases, i);
-        uint64_t one;
-        ok = database_begin(d, r, &one);
-        if (!ok) break;
-        state = one && state ? (state ^ one) * 0x100000001B3u : 0;
-        ok = add_terrains(d, r, collections);
+        uint64_t one = 0;
+        const bool ok = database_begin(d, r, &one) && add_terrains(d, r, collections);
+        if (!ok) add_problem(d, r, problems);
+        state = ok && one && state ? (state ^ one) * 0x100000001B3u : 0;
         database_end(d);
     }
-    if (ok && endpoint_represent(r, state, JSON, false, false))
-        answer_json(r, JSON, page);
-    else
-        cJSON_Delete(page);
+    const int failed = cJSON_GetArraySize(problems);
+    if (failed) cJSON_AddItemReferenceToObject(page, "problems", problems);
+    if (failed < w->database_count) {
+        answer_clear(r);
+        if (endpoint_represent(r, state, JSON, false, false)) {
+            answer_json(r, JSON, page);
+            page = NULL;
+        }
+    }
+    cJSON_Delete(page);
+    cJSON_Delete(problems);
 }

@@ -15,7 +15,6 @@
 
 const endpoint endpoints[] = {
     {"landing", "/", " f ", answer_landing, false},
-    {"page", "/{file}", " ", NULL, false},
     {"openapi", "/openapi.json", " ", answer_openapi, false},
     {"conformance", "/conformance", " ", answer_conformance, false},
     {"collections", "/collections", " ", answer_collections, false},
@@ -24,12 +23,13 @@ const endpoint endpoints[] = {
     {"view", TERRAIN "/view", " camera! f " OPTION_NAMES, answer_view, false},
     {"delta", TERRAIN "/delta", REGION "eps_from! eps_to! ", answer_delta, false},
     {"height", TERRAIN "/height", " x! y! eps ", answer_height, false},
-    {"profile", TERRAIN "/profile", " line! eps f ", answer_profile, false},
+    {"profile", TERRAIN "/profile", " line! eps ", answer_profile, false},
     {"verify", TERRAIN "/verify", REGION "eps! " OPTION_NAMES, answer_verify, false},
     {"explain", TERRAIN "/explain", REGION "eps! " OPTION_NAMES, answer_explain, false},
     {"area", TERRAIN "/area", REGION "eps! " OPTION_NAMES, answer_area, false},
     {"health", "/healthz", " ", answer_health, true},
     {"metrics", "/metrics", " ", answer_metrics, true},
+    {"page", "/{file}", " ", NULL, false},
 };
 const int endpoint_count = sizeof endpoints / sizeof *endpoints;
 
