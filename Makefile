@@ -158,13 +158,24 @@ coverage: ## the test programs in a build that counts: the core's lines, 100 % b
 	@BUILD=$(BUILD)/coverage PROGRAMS="$(notdir $(TEST_PROGRAMS))" ./tests/run.sh programs
 	@/usr/bin/python3 tests/coverage.py $(BUILD)/coverage
 
-# What runs on several threads: readers beside a writer, the import's reader and workers, which work on sweeps and builds.
+# What runs on several threads: readers beside a writer, the import's reader and workers, which work on sweeps and builds;
+# and the query service's workers.
 THREADED = test_fault_threads
-.PHONY: test-threads
+.PHONY: test-threads test-serve
 test-threads: ## what runs on several threads, under ThreadSanitizer
 	@./src/install-packages.sh build test
-	@$(MAKE) --no-print-directory -j2 BUILD=$(BUILD)/threads OPTIMIZE=-O1 WARNINGS=-w SANITIZE=-fsanitize=thread $(THREADED:%=$(BUILD)/threads/tests/%)
+	@$(MAKE) --no-print-directory -j2 products
+	@$(MAKE) --no-print-directory -j2 BUILD=$(BUILD)/threads OPTIMIZE=-O1 WARNINGS=-w SANITIZE=-fsanitize=thread $(THREADED:%=$(BUILD)/threads/tests/%) $(BUILD)/threads/rqt
 	@BUILD=$(BUILD)/threads PROGRAMS="$(THREADED)" ./tests/run.sh programs
+	@TSAN_OPTIONS=suppressions=$(CURDIR)/tests/threads.supp RQT_HOSTILE_MIB=1024 RQT=$(CURDIR)/$(BUILD)/threads/rqt RQT_SO=$(CURDIR)/$(BUILD)/rqt.so ./tests/test_serve.sh | grep -v '^ok'
+
+test-serve: ## the query service's tests, plain and under ASan and UBSan
+	@./src/install-packages.sh build test
+	@$(MAKE) --no-print-directory -j2 products
+	@$(MAKE) --no-print-directory -j2 BUILD=$(BUILD)/sanitized OPTIMIZE=-O1 \
+	  SANITIZE="-fsanitize=address,undefined -fno-sanitize-recover=undefined" $(BUILD)/sanitized/rqt
+	@RQT=$(CURDIR)/$(BUILD)/rqt RQT_SO=$(CURDIR)/$(BUILD)/rqt.so ./tests/test_serve.sh | grep -v '^ok'
+	@ASAN_OPTIONS=detect_leaks=1 RQT_HOSTILE_MIB=1024 RQT=$(CURDIR)/$(BUILD)/sanitized/rqt RQT_SO=$(CURDIR)/$(BUILD)/rqt.so ./tests/test_serve.sh | grep -v '^ok'
 
 # clang's libFuzzer steers by what code an input reaches; what it finds stays in build/fuzz/NAME.
 SECONDS ?= 60
@@ -220,7 +231,7 @@ check-docs: ## fail when ext/SQL.md, the README's session or the list of fuzzers
 	@./tests/check_fuzz.sh
 
 # ---------------------------------------------------------------------------------------------------- benches
-.PHONY: bench bench-data bench-update bench-table1 chart peers
+.PHONY: bench bench-data bench-update bench-table1 bench-serve chart peers
 bench: ## speed and size beside GDAL's, medians of five and more
 	@./src/install-packages.sh build test
 	@$(MAKE) --no-print-directory -j2 products
@@ -238,6 +249,11 @@ bench-table1: ## share of vertices over eps beside the paper's table 1
 	@./src/install-packages.sh build test
 	@$(MAKE) --no-print-directory -j2 products
 	@BUILD=$(BUILD) ./tests/bench/bench_table1.sh
+
+bench-serve: ## the query service under wrk, beside nginx that sends the same bytes
+	@./src/install-packages.sh build bench
+	@$(MAKE) --no-print-directory -j2 products
+	@BUILD=$(BUILD) ./tests/bench/bench_serve.sh
 
 # What published methods give on the catalogue's inputs (tests/catalogue.txt), beside rqt.
 .PHONY: stability check-stability

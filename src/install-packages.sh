@@ -1,7 +1,7 @@
 #!/bin/sh
 # install-packages.sh PURPOSE... - installs the Debian packages that a purpose needs and this machine lacks, saying which.
 #
-# Purposes: build, test, format, fuzz, lint, peers, qgis (650 MB). Does nothing, silently, when all is there. Needs root or sudo only when something
+# Purposes: build, test, format, fuzz, lint, bench, peers, qgis (650 MB). Does nothing, silently, when all is there. Needs root or sudo only when something
 # is missing. On another system it says what to install by hand.
 set -eu
 
@@ -14,6 +14,7 @@ packages_for() {
     qgis) echo python3-qgis ;;
     fuzz) echo clang-14 libclang-rt-14-dev ;;
     lint) echo clang-tidy-14 cppcheck ;;
+    bench) echo wrk nginx-light curl python3 util-linux ;;
     peers) command -v node >/dev/null 2>&1 && command -v npm >/dev/null 2>&1 || echo nodejs npm ;;
     *) echo "install-packages.sh: unknown purpose $1" >&2; exit 2 ;;
     esac

@@ -13,8 +13,6 @@ import random
 import re
 import socket
 import struct
-import sys
-import time
 import urllib.parse
 
 import sql_support as s
@@ -279,7 +277,6 @@ base = service.memory()
 loris = [connect() for _ in range(60)]
 for sock in loris[:30]:
     sock.sendall(b"GET /healthz HTTP/1.1\r\nHost: x\r\nX-Slow: ")
-slow_since = time.monotonic()
 
 
 def feed():
@@ -294,11 +291,9 @@ def feed():
     return taken
 
 
-fed = feed()
+feed()
 largest = base
-slowest = (0, None)
 while sent < COUNT:
-    tick = time.monotonic()
     kind = dice.randrange(20)
     if kind < 12:
         burst([get(query_target(), dice.choice((b"GET", b"GET", b"GET", b"HEAD")), dice.choice(HEADERS) if dice.randrange(3) == 0 else b"") for _ in range(dice.choice((1, 5, 40)))])
@@ -311,8 +306,6 @@ while sent < COUNT:
     if kind == 19:
         feed()
         largest = max(largest, service.memory())
-    slowest = max(slowest, (time.monotonic() - tick, kind))
-    if time.monotonic() - tick > 0.5: print(kind, time.monotonic() - tick)
     if not service.is_alive():
         break
 

@@ -1,6 +1,7 @@
 /* http.c - libmicrohttpd's callbacks.
  *
- * One thread of the library holds all connections (epoll). A request whose headers are complete is either answered
+ * One thread of the library holds all connections, by poll: with epoll, 0.9.75 does not see an end of the stream that
+ * came with the last bytes. A request whose headers are complete is either answered
  * there (what needs no database) or suspended and handed to the workers; a worker resumes it when its answer is
  * whole. So a slow answer holds up nobody who asks for a quick one, but for its worker.
  *
@@ -291,7 +292,7 @@ bool http_begin(service *s, int listening, char *why, size_t size) {
     }
     pthread_mutex_init(&s->peers->lock, NULL);
     s->daemon = MHD_start_daemon(
-        MHD_USE_EPOLL_INTERNAL_THREAD | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_ERROR_LOG, 0, NULL, NULL, on_request, s,
+        MHD_USE_POLL_INTERNAL_THREAD | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_ERROR_LOG, 0, NULL, NULL, on_request, s,
         MHD_OPTION_EXTERNAL_LOGGER, be_silent, NULL, MHD_OPTION_LISTEN_SOCKET, listening,
         MHD_OPTION_CONNECTION_LIMIT, (unsigned)s->options.connections, MHD_OPTION_CONNECTION_TIMEOUT,
         (unsigned)IDLE_SECONDS, MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)CONNECTION_MEMORY,
