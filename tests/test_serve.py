@@ -436,6 +436,15 @@ new_tag = list(after)[0][1]
 equal("after an update all give the new one", after, {(200, new_tag, sql_of(one))})
 check("under another tag", new_tag != tag and list(after)[0][2] != list(before)[0][2])
 equal("and the old tag is not true any more", ask(PLAIN, headers={"If-None-Match": tag}).status, 200)
+tag = ask("/collections/plain").etag
+before_stat = os.stat(one)
+touch = s.connect(one)
+touch.execute("UPDATE rqt_terrain SET created = 'lately' WHERE name = 'plain'")
+touch.close()
+os.utime(one, ns=(before_stat.st_atime_ns, before_stat.st_mtime_ns))
+equal("(a commit, and the file's size and time are what they were)", os.stat(one)[6:9:2], before_stat[6:9:2])
+answer = ask("/collections/plain")
+check("a commit is seen by SQLite's own counter", answer.json()["terrain"]["created"] == "lately" and answer.etag not in (tag, None), answer.headers)
 s.import_terrain(one, higher, name="plain", nodata=-9999, replace=True)
 equal("after an import in its place", {(a[0], a[2]) for a in all_workers(PLAIN)}, {(200, sql_of(one))})
 

@@ -1,9 +1,9 @@
 /* http.c - libmicrohttpd's callbacks.
  *
- * One thread of the library holds all connections, by poll: with epoll, 0.9.75 does not see an end of the stream that
- * came with the last bytes. A request whose headers are complete is either answered
- * there (what needs no database) or suspended and handed to the workers; a worker resumes it when its answer is
- * whole. So a slow answer holds up nobody who asks for a quick one, but for its worker.
+ * One thread of the library holds all connections, by poll: with epoll, 0.9.75 does not see an end of the stream
+ * that came with the last bytes. A request whose headers are complete is either answered there (what needs no
+ * database) or suspended and handed to the workers; a worker resumes it when its answer is whole. So a slow answer
+ * holds up nobody who asks for a quick one, but for its worker.
  *
  * Slow clients. The library's own timeout counts from the last byte, so that one byte every few seconds holds a
  * connection for ever. Therefore each connection is known here as a peer with the time since when it has been in
