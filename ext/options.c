@@ -15,7 +15,7 @@ typedef struct choice {
 static const choice choices[] = {
     {"mode", " cover snap border cut ", ""},
     {"outline", " exact tol ", ""},
-    {"metric", " exact minimal local wedgie euclid ", ""},
+    {"metric", " exact minimal local wedgie euclid plane ", ""},
     {"select", " threshold topdown bottomup ", ""},
     {"strip", " bintree fan ", ""},
     {"detail", "[", ""},

@@ -1,13 +1,13 @@
 #!/bin/bash
-# check_fuzz.sh - does every public function of rqt.h, and every SQL function, have a fuzzer? `write` prints the list of
+# check_fuzz.sh - does every public function of rqt.h and rqt_view.h, and every SQL function, have a fuzzer? `write` prints the list of
 # tests/fuzz/README.md; without it, the list there is compared, and must be whole.
 set -u
 cd "$(dirname "$0")/.." || exit 1
 failed=0
 
-# Names that rqt.h declares as functions: an identifier before a parenthesis, comments and typedefs of callbacks left out.
+# Names that they declare as functions: an identifier before a parenthesis, comments and typedefs of callbacks left out.
 core() {
-    sed -e 's,/\*.*\*/,,' -e '/\/\*/,/\*\//d' -e 's,//.*,,' src/core/rqt.h | grep -v '^ *#' | grep -oE '\brqt_[a-z0-9_]+\(' | tr -d '(' | sort -u |
+    sed -e 's,/\*.*\*/,,' -e '/\/\*/,/\*\//d' -e 's,//.*,,' src/core/rqt.h src/core/rqt_view.h | grep -v '^ *#' | grep -oE '\brqt_[a-z0-9_]+\(' | tr -d '(' | sort -u |
         grep -v '^rqt_build_emit$'
 }
 sql() { sed -n 's/^    {\.name = "\(rqt_[a-z_]*\)".*/\1/p' ext/functions.c; }

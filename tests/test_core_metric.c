@@ -221,6 +221,112 @@ static void euclid_squared(const oracle *o, const piece *p, mpq_t out) {
     mpq_clears(c, gx, gy, one, NULL);
 }
 
+/* Solves three normal equations a x = b; what they leave open is 0. */
+static void solve(mpq_t a[3][4], mpq_t x[3]) {
+    int row = 0, pivot_of[3] = {-1, -1, -1};
+    mpq_t factor;
+    mpq_init(factor);
+    for (int column = 0; column < 3; column++) {
+        int pivot = row;
+        while (pivot < 3 && mpq_sgn(a[pivot][column]) == 0) pivot++;
+        if (pivot == 3) continue;
+        for (int k = 0; k < 4; k++) mpq_swap(a[row][k], a[pivot][k]);
+        for (int other = 0; other < 3; other++) {
+            if (other == row) continue;
+            mpq_div(factor, a[other][column], a[row][column]);
+            for (int k = 0; k < 4; k++) {
+                mpq_t part;
+                mpq_init(part);
+                mpq_mul(part, factor, a[row][k]);
+                mpq_sub(a[other][k], a[other][k], part);
+                mpq_clear(part);
+            }
+        }
+        pivot_of[column] = row++;
+    }
+    for (int column = 0; column < 3; column++) {
+        mpq_set_ui(x[column], 0, 1);
+        if (pivot_of[column] >= 0) mpq_div(x[column], a[pivot_of[column]][3], a[pivot_of[column]][column]);
+    }
+    mpq_clear(factor);
+}
+
+static int is_in(const oracle_point v[3], long x, long y) {
+    int left = 0, right = 0;
+    for (int n = 0; n < 3; n++) {
+        const oracle_point a = v[n], b = v[(n + 1) % 3];
+        const long side = (b.x - a.x) * (y - a.y) - (b.y - a.y) * (x - a.x);
+        left |= side > 0;
+        right |= side < 0;
+    }
+    return !(left && right);
+}
+
+/* The mean distance of the valid samples from the plane fitted to them, in quanta. */
+static void fitted_distance(const oracle *o, const piece *p, mpq_t out) {
+    oracle_point v[3];
+    for (int n = 0; n < 3; n++) v[n] = oracle_clamp(o, p->t.corner[n]);
+    mpq_t a[3][4], plane[3], part, off;
+    for (int i = 0; i < 3; i++) {
+        for (int k = 0; k < 4; k++) mpq_init(a[i][k]);
+        mpq_init(plane[i]);
+    }
+    mpq_inits(part, off, NULL);
+    mpq_set_ui(out, 0, 1);
+    unsigned long count = 0;
+    for (int pass = 0; pass < 2; pass++) {
+        for (int y = 0; y < o->terrain.height; y++)
+            for (int x = 0; x < o->terrain.width; x++) {
+                if (!is_in(v, x, y) || !oracle_is_valid(o, (oracle_point){x, y})) continue;
+                const long term[4] = {1, x, y, o->terrain.q[y * o->terrain.width + x]};
+                if (pass == 0) {
+                    count++;
+                    for (int i = 0; i < 3; i++)
+                        for (int k = 0; k < 4; k++) {
+                            mpq_set_si(part, term[i], 1);
+                            mpq_set_si(off, term[k], 1);
+                            mpq_mul(part, part, off);
+                            mpq_add(a[i][k], a[i][k], part);
+                        }
+                } else {
+                    mpq_set_si(off, term[3], 1);
+                    for (int i = 0; i < 3; i++) {
+                        mpq_set_si(part, term[i], 1);
+                        mpq_mul(part, part, plane[i]);
+                        mpq_sub(off, off, part);
+                    }
+                    mpq_abs(off, off);
+                    mpq_add(out, out, off);
+                }
+            }
+        if (pass == 0) solve(a, plane);
+    }
+    if (count) {
+        mpq_set_ui(part, count, 1);
+        mpq_div(out, out, part);
+    }
+    for (int i = 0; i < 3; i++) {
+        for (int k = 0; k < 4; k++) mpq_clear(a[i][k]);
+        mpq_clear(plane[i]);
+    }
+    mpq_clears(part, off, NULL);
+}
+
+/* 2^-39 of the largest difference of two valid heights, in quanta. */
+static void rounding(const oracle *o, mpq_t out) {
+    long low = 0, high = 0;
+    int any = 0;
+    for (int n = 0; n < o->terrain.width * o->terrain.height; n++) {
+        const long q = o->terrain.q[n];
+        if (o->terrain.valid && !o->terrain.valid[n]) continue;
+        if (!any || q < low) low = q;
+        if (!any || q > high) high = q;
+        any = 1;
+    }
+    mpq_set_si(out, high - low, 1);
+    mpq_div_2exp(out, out, 39);
+}
+
 /* The smallest code whose square is not below v. */
 static unsigned root_up(const mpq_t v) {
     mpq_t value;
@@ -250,6 +356,18 @@ static void number_of(const pieces *all, int n, rqt_metric metric, unsigned code
         mpq_set_d(cost, 1 + 0x1p-40);
         mpq_mul(value, value, cost);
         code[1] = root_up(value);
+    } else if (metric == RQT_METRIC_PLANE) {
+        fitted_distance(all->o, p, value);
+        rounding(all->o, cost);
+        mpq_mul(value, value, all->o->quantum);
+        mpq_mul(cost, cost, all->o->quantum);
+        mpq_sub(value, value, cost);
+        code[0] = mpq_sgn(value) > 0 ? oracle_code_up(value) : 0;
+        mpq_add(value, value, cost);
+        mpq_add(value, value, cost);
+        code[1] = oracle_code_up(value);
+        mpq_sub(value, value, cost);
+        if (mpq_sgn(value) == 0) code[1] = 0; /* a plane is one */
     } else {
         if (metric == RQT_METRIC_LOCAL)
             local_distance(all->o, p, value);
@@ -294,16 +412,13 @@ static raster random_raster(int round, int most) {
     return r;
 }
 
-static void local_wedgie_and_euclid_are_their_definitions(void **state) {
-    (void)state;
-    random_begin("definitions");
-    static const rqt_metric metrics[] = {RQT_METRIC_LOCAL, RQT_METRIC_WEDGIE, RQT_METRIC_EUCLID};
-    for (int round = 0; round < 90; round++) {
+static void hold_to_definitions(const rqt_metric *metrics, int count, int rounds) {
+    for (int round = 0; round < rounds; round++) {
         model m;
         model_create(&m, random_raster(round, 14));
         pieces all = pieces_of(&m.o);
         const size_t n = (size_t)(m.o.side * m.o.side);
-        for (int which = 0; which < 3; which++) {
+        for (int which = 0; which < count; which++) {
             unsigned *code[2] = {calloc(n, sizeof **code), calloc(n, sizeof **code)};
             if (!code[0] || !code[1]) abort();
             for (int p = 0; p < all.count; p++) {
@@ -337,6 +452,20 @@ static void local_wedgie_and_euclid_are_their_definitions(void **state) {
         free(all.p);
         model_free(&m);
     }
+}
+
+static void local_wedgie_and_euclid_are_their_definitions(void **state) {
+    (void)state;
+    random_begin("definitions");
+    static const rqt_metric metrics[] = {RQT_METRIC_LOCAL, RQT_METRIC_WEDGIE, RQT_METRIC_EUCLID};
+    hold_to_definitions(metrics, 3, 90);
+}
+
+static void a_fitted_plane_is_its_definition(void **state) {
+    (void)state;
+    random_begin("fitted planes");
+    const rqt_metric plane = RQT_METRIC_PLANE;
+    hold_to_definitions(&plane, 1, 90);
 }
 
 /* ------------------------------------------------------------------------------------------- minimal -- */
@@ -612,6 +741,7 @@ int main(void) {
     random_announce();
     const struct CMUnitTest tests[] = {
         TEST(local_wedgie_and_euclid_are_their_definitions),
+        TEST(a_fitted_plane_is_its_definition),
         TEST(minimal_errors_select_what_splitting_bad_leaves_gives),
         TEST(no_mesh_of_5_by_5_is_smaller_or_nearer_within_its_size),
         TEST(what_is_called_a_bound_is_one),

@@ -323,7 +323,7 @@ for kind in ("F16_corner_centre_row", "F17_void_block", "F17_checkerboard", "F18
                 db, "SELECT count(*) FROM rqt_range(NULL, ?, NULL, ?)", eps, TOL)
         equal("%s, --void-tol %g, outline tol: within eps, no cracks, parts of one mesh, no void touched, all promised samples "
               "covered, at six eps" % (kind, void_tol), bad[:3], [])
-        for metric in ("minimal", "local", "wedgie", "euclid"):
+        for metric in ("minimal", "local", "wedgie", "euclid", "plane"):
             options = '{"outline":"tol","metric":"%s"}' % metric
             proof = rows(db, PROOF, None, 2.5, options)[0]
             check("%s, --void-tol %g, metric %s keeps the promise of tol" % (kind, void_tol, metric),

@@ -280,7 +280,7 @@ def refused(title, sentence, **given):
     raises(title, "rqt_range(): " + sentence, lambda: rows(db, "SELECT * FROM rqt_range(NULL, 5, NULL, ?)", options(**given)))
 
 
-for metric in ("minimal", "local", "euclid"):
+for metric in ("minimal", "local", "euclid", "plane"):
     refused("metric %s and detail" % metric, 'option "detail" needs the metric exact or wedgie', detail=[], metric=metric)
     refused("metric %s and border" % metric, 'mode "border" needs the metric exact or wedgie', mode="border", metric=metric)
 refused("detail a number", 'option "detail" must be a list of [geometry as text, eps], or the name of a table', detail=5)

@@ -7,7 +7,7 @@ import shutil
 import sql_support as s
 from sql_support import check, equal, one, rows, triangles
 
-METRICS = ["exact", "minimal", "local", "wedgie", "euclid"]
+METRICS = ["exact", "minimal", "local", "wedgie", "euclid", "plane"]
 BOUNDS = ["exact", "minimal", "wedgie"]
 EPS = [0, 1, 5, 20, 100, float("inf")]
 

@@ -168,10 +168,6 @@ static int state_in(const deviation_field *s, const rqt_triangle *t, const sampl
     return state;
 }
 
-typedef struct row_span {
-    int32_t x0, x1;
-} row_span;
-
 /* ------------------------------------------------------------------------------------ any triangle at all */
 
 static int64_t floor_divide(int64_t a, int64_t b) {
@@ -204,8 +200,8 @@ sample_triangle sample_triangle_of(const deviation_field *s, const plane_triangl
                              .in_doubles = in_doubles};
 }
 
-/* The samples of row y, by the three edges. */
-static row_span span_by_edges(const sample_triangle *t, int32_t x0, int32_t x1, int32_t y) {
+/* By the three edges. */
+row_span triangle_row(const sample_triangle *t, int32_t x0, int32_t x1, int32_t y) {
     int64_t xa = x0, xb = x1;
     for (int e = 0; e < 3; e++) { /* inside: dx*(y-py) - dy*(x-px) >= 0 */
         const rqt_vertex p = t->corner[e], next = t->corner[e + 1];
@@ -257,7 +253,7 @@ static scan scan_triangle(const deviation_field *s, const sample_triangle *t, co
     const int32_t x0 = larger(box.x0, window->x0), x1 = smaller(box.x1, window->x1);
     const int32_t y0 = larger(box.y0, window->y0), y1 = smaller(box.y1, window->y1);
     for (int32_t y = y0; y <= y1; y++) {
-        const row_span span = span_by_edges(t, x0, x1, y);
+        const row_span span = triangle_row(t, x0, x1, y);
         for (int32_t x = span.x0; x <= span.x1;) { /* run by run of valid samples */
             int32_t n = span.x1 - x + 1;
             if (s->valid) {

@@ -68,6 +68,11 @@ typedef struct sample_triangle {
     bool in_doubles;      /* its plane is exact in doubles: every term and sum is below 2^53 */
 } sample_triangle;
 sample_triangle sample_triangle_of(const deviation_field *s, const plane_triangle *p);
+typedef struct row_span {
+    int32_t x0, x1; /* none where x0 > x1 */
+} row_span;
+/* Its samples in row y, of those from x0 to x1. */
+row_span triangle_row(const sample_triangle *t, int32_t x0, int32_t x1, int32_t y);
 
 /* Does the clamped triangle have an area? Those that have none cost nothing and are never mixed. */
 bool triangle_has_area(const deviation_field *s, const rqt_triangle *t);
@@ -91,6 +96,9 @@ typedef struct triangle_error {
 triangle_error irregular_error(const deviation_field *s, const rqt_triangle *t, int known_state);
 /* Of one inside the raster whose samples are all valid, the deviation as a multiple of 2^-*shift quanta. */
 uint64_t regular_deviation(const deviation_field *s, const rqt_triangle *t, int *shift);
+/* The mean distance, vertical, in quanta, of the valid samples of a triangle with an area from the plane fitted to
+ * them by least squares; 0 where there are none. fit.c */
+double fitted_distance(const deviation_field *s, const rqt_triangle *t);
 /* The largest difference of two valid heights. */
 int64_t relief_of(const rqt_grid *grid);
 

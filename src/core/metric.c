@@ -84,6 +84,10 @@ static rqt_code tilt(const solver *s, const plane *p, double deviation, double d
     return code_above(deviation / denominator * quantum / sqrt(1 + (east * east + south * south)) * (1 + 0x1p-44));
 }
 
+static rqt_code fitted_code(const solver *s, const rqt_triangle *t) {
+    return code_above(fitted_distance(&s->field, t) * s->field.scale.factor);
+}
+
 /* |height - plane| of the clamped split vertex, as numerator / denominator quanta; 0 where a corner or it is void.
  */
 static unsigned __int128 split_distance(const deviation_field *f, const rqt_triangle *t, uint64_t *denominator) {
@@ -132,6 +136,8 @@ static part visit_irregular(solver *s, const rqt_triangle *t, rqt_vertex split, 
             plane_of(&s->field, rqt_vertex_clamp(&s->field.lattice, t->apex),
                      rqt_vertex_clamp(&s->field.lattice, t->left), rqt_vertex_clamp(&s->field.lattice, t->right));
         code = tilt(s, &p, (double)found.deviation, (double)found.denominator);
+    } else if (s->metric == RQT_METRIC_PLANE) {
+        code = fitted_code(s, t);
     }
     if (found.ground > code) code = found.ground;
     put(s, t->apex, split, code, found.mixed);
@@ -148,6 +154,10 @@ static uint64_t midpoint_distance(const deviation_field *f, const rqt_triangle *
 static uint64_t visit_regular(solver *s, const rqt_triangle *t, rqt_vertex split, uint64_t children) {
     uint64_t number;
     int shift = 1;
+    if (s->metric == RQT_METRIC_PLANE) {
+        put(s, t->apex, split, fitted_code(s, t), false);
+        return 0;
+    }
     if (s->metric == RQT_METRIC_LOCAL || s->metric == RQT_METRIC_WEDGIE) {
         number = midpoint_distance(&s->field, t, split);
         if (s->metric == RQT_METRIC_WEDGIE) number += children;
@@ -220,7 +230,7 @@ static part visit(solver *s, const rqt_triangle *t, int size) {
 /* -------------------------------------------------------------------------------------------- the whole */
 
 const char *rqt_metric_name(rqt_metric metric) {
-    static const char *const names[RQT_METRICS] = {"exact", "minimal", "local", "wedgie", "euclid"};
+    static const char *const names[RQT_METRICS] = {"exact", "minimal", "local", "wedgie", "euclid", "plane"};
     return (unsigned)metric < RQT_METRICS ? names[metric] : NULL;
 }
 

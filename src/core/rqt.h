@@ -778,9 +778,10 @@ typedef enum rqt_metric {
     RQT_METRIC_MINIMAL, /* the least closed set no leaf of which has a larger one: a bound, and the smallest mesh */
     RQT_METRIC_LOCAL,   /* of the split vertex alone from the hypotenuse: no bound */
     RQT_METRIC_WEDGIE,  /* that, plus the larger number of the two halves: a bound, not a tight one */
-    RQT_METRIC_EUCLID   /* the largest distance of a sample of T from T's plane in space: no bound of heights */
+    RQT_METRIC_EUCLID,  /* the largest distance of a sample of T from T's plane in space: no bound of heights */
+    RQT_METRIC_PLANE    /* the mean distance of T's samples from the plane fitted to them: no bound */
 } rqt_metric;
-#define RQT_METRICS 5
+#define RQT_METRICS 6
 
 /* "exact", "minimal" ...; NULL when there is none. */
 const char *rqt_metric_name(rqt_metric metric);
@@ -791,9 +792,9 @@ size_t rqt_metric_bytes(const rqt_lattice *lattice, rqt_metric metric);
 /* The metric of every vertex, closed, and the outline bits, so that a threshold selects: for rqt_pyramid_create.
  * minimal depends on the outline, because a mixed triangle that has to go takes others along: with
  * RQT_OUTLINE_EXACT, codes of vertices that are in every mesh are RQT_CODE_LARGEST, with the bit. Codes are rounded
- * up: exactly, except for euclid, which may be one code further up where it is within 2^-40 of a code, and wedgie,
- * whose parts at the raster's edge and at voids are rounded up to half a quantum each. O(n log n) time.
- * progress as in rqt_errors_compute. */
+ * up: exactly, except for euclid, which may be one code further up where it is within 2^-40 of a code, wedgie,
+ * whose parts at the raster's edge and at voids are rounded up to half a quantum each, and plane, which is computed
+ * in doubles and 0 below 2^-40 of the terrain's relief. O(n log n) time. progress as in rqt_errors_compute. */
 rqt_status rqt_metric_compute(const rqt_grid *grid, const rqt_unit *unit, const rqt_void_cost *cost,
                               rqt_metric metric, rqt_outline outline, const rqt_allocator *allocator,
                               bool (*progress)(void *context, double done), void *context, rqt_errors *closed);

@@ -49,6 +49,9 @@ bool rqt_camera_project(const rqt_camera *camera, const double point[3], double 
 typedef struct rqt_prism {
     double centre[3], up[3]; /* up: unit */
     double radius, half_height;
+    double upright; /* the least cosine of the angle between the line along which a mesh differs from a sample and
+                       up: 1 where heights are counted along up (eps is then larger where one looks down on the
+                       piece), 0: in any direction, which is always safe */
 } rqt_prism;
 
 /* What the tolerance allows the terrain whose samples are all in a piece. */
@@ -56,23 +59,24 @@ typedef struct rqt_view_bound {
     double eps;      /* metres of the scene: how far the mesh may be from a sample there; never not a number */
     bool shown;      /* false: nothing of the terrain there, nor of a mesh within eps of it, is drawn */
     double distance; /* a lower bound of how far the samples are from the eye */
-    double share;    /* 0 .. 1: eps over the most that any part of the piece could get. What is less than 1 was lost
-                        to the piece's being large: against its distance, sideways or upward, across the frustum's
-                        border, or in its angle to the axis. Well below 1 it is worth splitting; at 1 nothing is to
-                        be won. Where nothing is shown: over the most that could be of use, what drawn pieces as far
-                        away as its farthest point have. 0 around an eye, whatever the size: stop somewhere. */
+    double
+        share; /* 0 .. 1: eps over the most that any part of the piece could get. What is less than 1 was lost
+                  to the piece's being large: against its distance, sideways or upward, across the frustum's
+                  border, or in its angles to the axis and to up. Well below 1 it is worth splitting; at 1 nothing
+                  is to be won. Where nothing is shown: over the most that could be of use, what drawn pieces as far
+                  away as its farthest point have. 0 around an eye, whatever the size: stop somewhere. */
 } rqt_view_bound;
 
 /* The guaranteed test. For every point S of the piece and every point M of a mesh with |S - M| <= eps, in any
- * direction: when S or M is drawn (near .. far, inside the picture), their places in the picture (of the infinite
- * picture plane; both have a depth > 0) are at most tau apart. Where nothing is drawn eps says how far M has to
- * stay from the frustum: it is finite, but large beside what is drawn. Of use are cameras of rqt_camera_look;
- * numbers that are not finite, or too large to be squared, give eps 0. */
+ * direction that `upright` admits: when S or M is drawn (near .. far, inside the picture), their places in the
+ * picture (of the infinite picture plane; both have a depth > 0) are at most tau apart. Where nothing is drawn eps
+ * says how far M has to stay from the frustum: it is finite, but large beside what is drawn. Of use are cameras of
+ * rqt_camera_look; numbers that are not finite, or too large to be squared, give eps 0. */
 void rqt_view_tolerance(const rqt_camera *camera, const rqt_prism *prism, rqt_view_bound *bound);
 
 /* ---------------------------------------------------------------------------------------------- other tests --
  * Tests of the literature, by name, for comparing: they guarantee nothing on the screen. Each says how large the
- * error of its own metric may be in a piece; METHODS.md has definitions, sources and what had to be mended. */
+ * error of its own metric may be in a piece; METHODS.md, "Views", has definitions, sources and what was mended. */
 typedef enum rqt_view_test {
     RQT_VIEW_GUARANTEED,
     RQT_VIEW_ULRICH,    /* seed of chunked quadtrees: error against the Chebyshev distance to the piece's box */
@@ -83,10 +87,30 @@ typedef enum rqt_view_test {
 } rqt_view_test;
 #define RQT_VIEW_TESTS 6
 
+/* What the tests see of a square of ground: the prism that holds its samples, and a box that does, which lies in
+ * the terrain's own directions: all points p with |(p - centre) . east| <= half_east, |(p - centre) . (up x east)|
+ * <= half_north and |(p - centre) . up| <= half_height, where centre, up and half_height are the prism's. */
+typedef struct rqt_view_piece {
+    rqt_prism prism;
+    double east[3]; /* unit, at right angles to prism.up */
+    double half_east, half_north;
+    int32_t side; /* of the square, in sample steps */
+} rqt_view_piece;
+
+/* The squares that have one eps each in RQT_VIEW_LODMAP: sides in sample steps. [RQT] has patches of 161 x 161
+ * samples; this is the power of two next to that. */
+#define RQT_VIEW_PATCH 128
+
 /* "guaranteed", "ulrich", "node", "sphere", "lindstrom", "lodmap"; NULL when there is none. */
 const char *rqt_view_test_name(rqt_view_test test);
-/* The bound of any test; of RQT_VIEW_GUARANTEED that of rqt_view_tolerance. */
-void rqt_view_test_bound(rqt_view_test test, const rqt_camera *camera, const rqt_prism *prism,
+/* The metric whose errors the test is about. Only RQT_METRIC_EXACT is stored. */
+rqt_metric rqt_view_test_metric(rqt_view_test test);
+/* The bound of any test; of RQT_VIEW_GUARANTEED that of rqt_view_tolerance. For the others eps is infinite and
+ * `shown` false where the prism misses the frustum; else eps is what the test allows the piece, and share the least
+ * over the most that it allows its points. In RQT_VIEW_LODMAP squares larger than a patch get eps 0 and share 0,
+ * for they are to be split; patches and what is smaller have the share 1. eps may be 0 or infinite, never not a
+ * number. */
+void rqt_view_test_bound(rqt_view_test test, const rqt_camera *camera, const rqt_view_piece *piece,
                          rqt_view_bound *bound);
 
 #ifdef __cplusplus

@@ -24,6 +24,14 @@
  *   - the largest of any point of the piece: take S for the first point, drawn or not.
  * The smaller of both is used, and eps = kappa(t) max(d, near).
  *
+ * Where meshes differ from the terrain upward and downward only, and one looks down on them, more is allowed. Let
+ * the ray from the eye to S make an angle with the line through S and M whose sine is at most q. Twice the area of
+ * the triangle eye, S, M is |ES| |SM| q at most, and it is |ES| |EM| times the sine of the angle at the eye, which
+ * is eps q / |EM| then. With r = max(d, near) either M is drawn and at least near away, or |EM| >= |ES| - eps; in
+ * both cases (as above) |EM| >= r - eps: kappa is kept for eps = kappa r / (q + kappa). That is below r, so the
+ * angle at the eye, opposite to a side shorter than another one, is an acute one. The better of both is used, by
+ * setting q + kappa to 1 where it is above.
+ *
  * Where nothing of the piece can be drawn. The frustum, which is what is drawn, is convex and so is the piece; a
  * lower bound of their distance is how far they are apart along any unit vector. As long as eps is less, neither S
  * nor M is drawn. So eps may as well be that gap, whichever is larger, and the piece is not shown iff it is the
@@ -52,7 +60,7 @@ static double dot(const double a[3], const double b[3]) {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 static double larger(double a, double b) {
-    return a > b ? a : b;
+    return a >= b ? a : b;
 }
 static double smaller(double a, double b) {
     return a < b ? a : b;
@@ -89,6 +97,10 @@ static bool roll(rqt_camera *camera, const double vertical[3]) {
     cross(camera->forward, vertical, side);
     if (!(dot(side, side) > PARALLEL * PARALLEL)) return false;
     (void)make_unit(side, camera->right);
+    /* What rounding made of short sides is taken off. */
+    const double off = dot(camera->right, camera->forward);
+    for (int c = 0; c < 3; c++) camera->right[c] -= off * camera->forward[c];
+    (void)make_unit(camera->right, camera->right);
     cross(camera->right, camera->forward, camera->up);
     return make_unit(camera->up, camera->up);
 }
@@ -153,6 +165,8 @@ typedef struct sight {
     double at[3], axis[3]; /* centre - eye and the prism's up, along right, up and forward */
     double along, across;  /* centre - eye along the prism's up, and how long the rest is */
     double radius, half_height;
+    double ball,
+        tangent;         /* the radius of the ball around it, how long a tangent is to that; 0: the eye is inside */
     double halfwidth[2]; /* of the picture, over the focal length: x, y */
 } sight;
 
@@ -168,6 +182,9 @@ static sight see(const rqt_camera *camera, const rqt_prism *prism) {
     const double rest[3] = {v[0] - s.along * prism->up[0], v[1] - s.along * prism->up[1],
                             v[2] - s.along * prism->up[2]};
     s.across = sqrt(dot(rest, rest));
+    const double ball = s.radius * s.radius + s.half_height * s.half_height;
+    s.ball = sqrt(ball);
+    s.tangent = sqrt(above_zero(dot(v, v) - ball));
     for (int c = 0; c < 2; c++) {
         if (s.at[c] >= 0) continue;
         s.at[c] = -s.at[c];
@@ -209,19 +226,52 @@ static gap beyond(const rqt_camera *camera, const sight *s) {
     return g;
 }
 
-/* The tangents of the least and the largest angle that a drawn point of the ball around the prism can have. */
-static void tangents(const sight *s, double corner, double *least, double *largest) {
-    const double *const at = s->at;
-    const double ball = s->radius * s->radius + s->half_height * s->half_height,
-                 across = at[0] * at[0] + at[1] * at[1], outside = across + at[2] * at[2] - ball;
-    *least = 0;
-    *largest = corner;
-    if (!(outside > 0)) return;
-    const double aside = sqrt(across), tangent = sqrt(outside), radius = sqrt(ball);
-    const double outer[2] = {at[2] * tangent - aside * radius, aside * tangent + at[2] * radius};
-    if (outer[0] > 0 && outer[1] < smaller(corner, STEEPEST) * outer[0]) *largest = outer[1] / outer[0];
-    const double inner[2] = {at[2] * tangent + aside * radius, aside * tangent - at[2] * radius};
-    if (inner[1] > 0) *least = inner[1] < *largest * inner[0] ? inner[1] / inner[0] : *largest;
+/* Two angles of 0 to 180 degrees, each as a cosine and a sine, times the same length. */
+typedef struct angles {
+    double least[2], largest[2];
+} angles;
+
+/* Of the rays from the eye that hit the ball around the prism, with the axis along and across which its centre is:
+ * not cut off at 0 and 180 degrees. The eye is not inside. */
+static angles spread(const sight *s, double along, double across) {
+    return (angles){{along * s->tangent + across * s->ball, across * s->tangent - along * s->ball},
+                    {along * s->tangent - across * s->ball, across * s->tangent + along * s->ball}};
+}
+
+/* Lower and upper bounds of something, over a piece. */
+typedef struct range {
+    double least, largest;
+} range;
+
+/* The tangents of the angles to the camera's axis that drawn points of the ball around the prism can have. */
+static range tangents(const sight *s, double corner) {
+    range t = {0, corner};
+    if (!(s->tangent > 0)) return t;
+    const angles a = spread(s, s->at[2], sqrt(s->at[0] * s->at[0] + s->at[1] * s->at[1]));
+    const double most = smaller(corner, STEEPEST);
+    if (a.largest[0] > 0 && a.largest[1] < most * a.largest[0]) t.largest = a.largest[1] / a.largest[0];
+    if (a.least[1] > 0) t.least = a.least[1] < t.largest * a.least[0] ? a.least[1] / a.least[0] : t.largest;
+    return t;
+}
+
+/* The sines of the angles between rays to points of the prism and the direction in which a mesh may differ there.
+ */
+static range sines(const sight *s, double upright) {
+    if (!(upright > 0)) return (range){1, 1};
+    range r = {0, 1};
+    if (!(s->tangent > 0)) return r;
+    const angles a = spread(s, fabs(s->along), s->across);
+    const double length = s->tangent * s->tangent + s->ball * s->ball,
+                 tilt = sqrt(above_zero(1 - upright * upright)),
+                 outer = a.largest[0] * upright - a.largest[1] * tilt;
+    if (outer > 0) r.largest = smaller((a.largest[1] * upright + a.largest[0] * tilt) / length + SLACK, 1);
+    r.least = smaller(above_zero((a.least[1] * upright - a.least[0] * tilt) / length), r.largest);
+    return r;
+}
+
+/* eps at a distance, for the sine of the angle that tau allows and that of the angle between ray and difference. */
+static double allowed(double kappa, double sine, double distance) {
+    return distance * (kappa / smaller(sine + kappa, 1));
 }
 
 void rqt_view_tolerance(const rqt_camera *camera, const rqt_prism *prism, rqt_view_bound *bound) {
@@ -231,19 +281,17 @@ void rqt_view_tolerance(const rqt_camera *camera, const rqt_prism *prism, rqt_vi
                  slack = SLACK * (fabs(s.at[0]) + fabs(s.at[1]) + fabs(s.at[2]) + s.radius + s.half_height);
     const double up = above_zero(fabs(s.along) - s.half_height - slack),
                  aside = above_zero(s.across - s.radius - slack), distance = sqrt(up * up + aside * aside);
-    double least, largest;
-    tangents(&s, corner, &least, &largest);
+    const range t = tangents(&s, corner), sine = sines(&s, prism->upright);
     const gap g = beyond(camera, &s);
-    const double drawn = RELATIVE * kappa(pixel, largest) * larger(distance, camera->near),
+    const double drawn = RELATIVE * allowed(kappa(pixel, t.largest), sine.largest, larger(distance, camera->near)),
                  hidden = RELATIVE * (g.whole - slack);
     *bound = (rqt_view_bound){.eps = larger(drawn, hidden), .shown = !(hidden >= drawn), .distance = distance};
 
     /* The best that a part of it could have, far away and near the axis. Beyond the frustum more, which is of no
      * use where no part is drawn: there it only has to be no less than what the neighbours have. */
-    const double farthest = smaller(sqrt((fabs(s.along) + s.half_height) * (fabs(s.along) + s.half_height) +
-                                         (s.across + s.radius) * (s.across + s.radius)),
-                                    camera->far * sqrt(1 + corner * corner)),
-                 seen = kappa(pixel, least) * larger(farthest, camera->near),
+    const double deep = fabs(s.along) + s.half_height, wide = s.across + s.radius,
+                 farthest = sqrt(deep * deep + wide * wide),
+                 seen = allowed(kappa(pixel, t.least), sine.least, larger(farthest, camera->near)),
                  best = bound->shown ? larger(seen, g.farthest) : seen;
     bound->share = best > 0 ? smaller(bound->eps / best, 1) : 1;
     if (!(isfinite(slack) && isfinite(drawn) && isfinite(bound->eps) && bound->eps >= 0 && bound->share >= 0))

@@ -27,7 +27,7 @@ import sqlite3
 import sys
 import time
 
-METRICS = ["exact", "minimal", "local", "wedgie", "euclid"]
+METRICS = ["exact", "minimal", "local", "wedgie", "euclid", "plane"]
 EPS = [1, 2, 5, 10, 20]
 print("vertices, times those of `minimal`; true maximum error, times eps\n")
 print("| raster | eps | " + " | ".join(METRICS) + " |")

@@ -19,6 +19,8 @@
  *   float32       heights or coordinates in single precision
  *   padded        the raster filled up to 2^k + 1 with zeros
  *   voids ignored errors of valid samples alone, leaves with a void corner dropped
+ *
+ * A second table is of views: each named test's mesh, and rqt's guaranteed one, in the picture of a camera.
  * It exits with 1 should rqt itself fail a row. */
 #include "test_failures_support.h"
 
@@ -53,6 +55,12 @@ static void put_fault(bool is_so, const char *fault, int *count) {
     if (is_so) printf("%s%s", (*count)++ ? ", " : " **fails:** ", fault);
 }
 
+static void put_times(double times, int *count) {
+    char many[60];
+    (void)snprintf(many, sizeof many, "%.*f times the vertices", times < 10 ? 1 : 0, times);
+    put_fault(times > 1.5, many, count);
+}
+
 static void put_row(table *t, const char *number, const char *input, const char *eps, const char *method,
                     const outcome *theirs, const outcome *ours) {
     if (ours->ratio > 1 || ours->cracks || ours->overlaps || ours->outline) t->broken++;
@@ -63,15 +71,12 @@ static void put_row(table *t, const char *number, const char *input, const char 
     printf("| %s | %s | %s | %s |", number, input, eps, method);
     put_outcome(theirs);
     put_outcome(ours);
-    const double times = ours->vertices ? (double)theirs->vertices / (double)ours->vertices : 0;
-    char many[60];
     int faults = 0;
-    (void)snprintf(many, sizeof many, "%.*f times the vertices", times < 10 ? 1 : 0, times);
     put_fault(theirs->ratio > 1, "bound", &faults);
     put_fault(theirs->cracks, "cracks", &faults);
     put_fault(theirs->overlaps, "overlaps", &faults);
     put_fault(theirs->outline, "outline", &faults);
-    put_fault(times > 1.5, many, &faults);
+    put_times(ours->vertices ? (double)theirs->vertices / (double)ours->vertices : 0, &faults);
     printf("%s |\n", faults ? "" : " holds");
 }
 
@@ -369,6 +374,182 @@ static outcome padded(const raster *r, double eps) {
     return o;
 }
 
+/* ---------------------------------------------------------------------------------------------- views -- */
+/* A scene in metres: east, north and up from the first sample. Every unit square of ground is a piece, but for the
+ * LOD map, whose patch is the whole raster. */
+enum { CELL = 30 };
+
+typedef struct view {
+    const raster *r;
+    rqt_camera camera;
+    double offset; /* of the origin of float32's coordinates; 0: doubles */
+} view;
+
+static void place_of(double x, double y, double z, double out[3]) {
+    out[0] = CELL * x, out[1] = -CELL * y, out[2] = z;
+}
+
+static double eps_of_square(const view *v, rqt_view_test test, int x, int y, int side) {
+    int32_t low = INT32_MAX, high = INT32_MIN;
+    for (int j = y; j <= y + side; j++)
+        for (int i = x; i <= x + side; i++) {
+            const int32_t q = v->r->q[j * v->r->width + i];
+            if (q < low) low = q;
+            if (q > high) high = q;
+        }
+    rqt_view_piece p = {
+        .prism = {.up = {0, 0, 1}, .radius = CELL * side * 0.7072, .half_height = (high - low) / 2.0},
+        .east = {1, 0, 0},
+        .half_east = CELL * side / 2.0,
+        .half_north = CELL * side / 2.0,
+        .side = side};
+    place_of(x + side / 2.0, y + side / 2.0, (low + high) / 2.0, p.prism.centre);
+    rqt_view_bound b;
+    rqt_view_test_bound(test, &v->camera, &p, &b);
+    return b.eps;
+}
+
+/* The vertices whose number is above the least eps in their box: rqt.h, "rules". */
+static square select_by(const view *v, rqt_view_test test) {
+    const int n = v->r->width - 1;
+    square s = square_create(v->r, 0, 0, n);
+    rqt_errors_free(&s.errors, &test_allocator);
+    const rqt_grid grid = {.lattice = s.lattice, .q = v->r->q};
+    assert_int_equal(rqt_metric_compute(&grid, &v->r->unit, &v->r->cost, rqt_view_test_metric(test),
+                                        RQT_OUTLINE_EXACT, &test_allocator, NULL, NULL, &s.errors),
+                     RQT_OK);
+    double *eps = malloc((size_t)(n * n) * sizeof *eps);
+    if (!eps) abort();
+    for (int i = 0; i < n * n; i++)
+        eps[i] = test == RQT_VIEW_LODMAP ? (i ? eps[0] : eps_of_square(v, test, 0, 0, n))
+                                         : eps_of_square(v, test, i % n, i / n, 1);
+    for (int y = 0; y <= n; y++)
+        for (int x = 0; x <= n; x++) {
+            const int rank = rqt_vertex_rank(&s.lattice, (rqt_vertex){x, y}), half = (rank & 1 ? 3 : 2) << rank / 2;
+            double least = INFINITY;
+            for (int j = y - half > 0 ? y - half : 0; j < y + half && j < n; j++)
+                for (int i = x - half > 0 ? x - half : 0; i < x + half && i < n; i++)
+                    least = fmin(least, eps[j * n + i]);
+            *in_set(&s, (rqt_vertex){x, y}) =
+                rqt_errors_at(&s.errors, (rqt_vertex){x, y}, &(bool){false}) > rqt_code_eps(least, 0);
+        }
+    free(eps);
+    square_mesh(&s);
+    return s;
+}
+
+/* Where a point of a mesh is drawn: as it is, or by coordinates in single precision. */
+static bool draw(const view *v, const double at[3], double xy[2]) {
+    double there[3];
+    for (int i = 0; i < 3; i++)
+        there[i] = v->offset > 0 ? v->camera.eye[i] +
+                                       (double)((float)(v->offset + at[i]) - (float)(v->offset + v->camera.eye[i]))
+                                 : at[i];
+    return rqt_camera_project(&v->camera, there, xy);
+}
+
+/* The farthest that a sample is from the mesh at its place in the picture, pixels, when one of them is drawn. */
+static double picture_error(const view *v, const square *s) {
+    double worst = 0;
+    for (size_t n = 0; n < s->count; n++) {
+        const verify_corner *const c = s->triangles[n].corner;
+        int low[2] = {c[0].col, c[0].row}, high[2] = {c[0].col, c[0].row};
+        for (int k = 1; k < 3; k++) {
+            const int at[2] = {c[k].col, c[k].row};
+            for (int d = 0; d < 2; d++) {
+                if (at[d] < low[d]) low[d] = at[d];
+                if (at[d] > high[d]) high[d] = at[d];
+            }
+        }
+        const double area = (double)(c[1].col - c[0].col) * (c[2].row - c[0].row) -
+                            (double)(c[2].col - c[0].col) * (c[1].row - c[0].row);
+        for (int y = low[1]; y <= high[1]; y++)
+            for (int x = low[0]; x <= high[0]; x++) {
+                const double one = ((double)(x - c[0].col) * (c[2].row - c[0].row) -
+                                    (double)(c[2].col - c[0].col) * (y - c[0].row)) /
+                                   area,
+                             two = ((double)(c[1].col - c[0].col) * (y - c[0].row) -
+                                    (double)(x - c[0].col) * (c[1].row - c[0].row)) /
+                                   area;
+                if (one < 0 || two < 0 || one + two > 1) continue;
+                const double z = c[0].q + one * (c[1].q - c[0].q) + two * (c[2].q - c[0].q);
+                double sample[3], mesh[3], a[2], b[2];
+                place_of(x, y, v->r->q[y * v->r->width + x], sample);
+                place_of(x, y, z, mesh);
+                const bool drawn = rqt_camera_project(&v->camera, sample, a);
+                if (!(draw(v, mesh, b) || drawn)) continue;
+                const double moved = sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]));
+                worst = moved <= worst ? worst : moved >= 0 ? moved : INFINITY; /* one of them behind the eye */
+            }
+    }
+    return worst;
+}
+
+/* method NULL: the test by its name. */
+static void compare_views(table *t, const char *number, const char *input, const view *v, rqt_view_test test,
+                          const char *method) {
+    view own = *v;
+    own.offset = 0;
+    square theirs = select_by(v, test), ours = select_by(v, RQT_VIEW_GUARANTEED);
+    const double tau = v->camera.tau, wrong = picture_error(v, &theirs) / tau,
+                 right = picture_error(&own, &ours) / tau;
+    const verify_report a = prove_triangles(v->r, theirs.triangles, theirs.count),
+                        b = prove_triangles(v->r, ours.triangles, ours.count);
+    if (right > 1 || b.t_junctions) t->broken++;
+    if (!t->bars) {
+        printf("| %s | %s | %g | %s | %.2f | %llu | %llu | %.2f | %llu | %llu |", number, input, tau,
+               method ? method : rqt_view_test_name(test), wrong, (unsigned long long)a.t_junctions,
+               (unsigned long long)a.vertices, right, (unsigned long long)b.t_junctions,
+               (unsigned long long)b.vertices);
+        int faults = 0;
+        put_fault(wrong > 1, "tolerance", &faults);
+        put_fault(a.t_junctions, "cracks", &faults);
+        put_times((double)a.vertices / (double)b.vertices, &faults);
+        printf("%s |\n", faults ? "" : " holds");
+    }
+    square_free(&theirs);
+    square_free(&ours);
+}
+
+static view view_of(const raster *r, double x, double y, double z, const double direction[3], double fovy,
+                    double tau) {
+    const double up[3] = {0, 0, 1}, north[3] = {0, 1, 0};
+    view v = {.r = r, .camera = {.width = 1600, .height = 900, .far = INFINITY, .tau = tau}};
+    double eye[3];
+    rqt_message message;
+    place_of(x, y, z, eye);
+    if (rqt_camera_look(&v.camera, eye, direction, up, north, fovy, &message) != RQT_OK) abort();
+    return v;
+}
+
+static void views(table *t) {
+    random_begin("views");
+    raster r = raster_of(relief_hills, 129, 129, 40, 0, 0, 0, "hills");
+    const int32_t foot = r.q[64 * 129 + 64];
+    const double north[3] = {0, 1, 0}, down[3] = {0, 0, -1}, steep[3] = {0.3, 1, 0.5}, slanted[3] = {0, 1, -0.5};
+    const view below = view_of(&r, 64.3, 90.6, foot - 900, steep, 60, 4),
+               on = view_of(&r, 64, 64, foot, slanted, 60, 4),
+               wide = view_of(&r, 64.3, 120.2, foot + 900, slanted, 120, 4),
+               far_down = view_of(&r, 64.3, 60.4, foot + 1500, down, 90, 4);
+    for (int test = RQT_VIEW_ULRICH; test < RQT_VIEW_TESTS; test++)
+        compare_views(t, "F31", test == RQT_VIEW_ULRICH ? "hills 129 x 129, from below ground" : "the same", &below,
+                      (rqt_view_test)test, NULL);
+    for (int test = RQT_VIEW_ULRICH; test < RQT_VIEW_TESTS; test++)
+        compare_views(t, "F31", test == RQT_VIEW_ULRICH ? "hills 129 x 129, from a vertex" : "the same", &on,
+                      (rqt_view_test)test, NULL);
+    for (int test = RQT_VIEW_ULRICH; test < RQT_VIEW_TESTS; test++)
+        compare_views(t, "F32", test == RQT_VIEW_ULRICH ? "hills 129 x 129, 120 degrees" : "the same", &wide,
+                      (rqt_view_test)test, NULL);
+    for (int test = RQT_VIEW_ULRICH; test < RQT_VIEW_TESTS; test++)
+        compare_views(t, "F33", test == RQT_VIEW_ULRICH ? "hills 129 x 129, straight down, 90 degrees" : "the same",
+                      &far_down, (rqt_view_test)test, NULL);
+    view far_off = view_of(&r, 64.31, 64.42, foot + 1.7, north, 60, 1);
+    far_off.offset = 1e7;
+    compare_views(t, "F34", "hills 129 x 129 at northing 10^7 m, from a man's height", &far_off,
+                  RQT_VIEW_GUARANTEED, "float32");
+    raster_free(&r);
+}
+
 /* ----------------------------------------------------------------------------------------------- rows -- */
 static void heights(table *t) {
     raster r = raster_of(relief_plane, 33, 33, 3, -5, 7, 0, "plane");
@@ -469,6 +650,11 @@ int main(int argc, char **argv) {
     heights(&t);
     voids(&t);
     meshes(&t);
+    if (!t.bars)
+        printf("\n| case | input | tau, px | method | displacement / tau | cracks | vertices | rqt: displacement / "
+               "tau | "
+               "cracks | vertices | the method |\n|---|---|---:|---|---:|---:|---:|---:|---:|---:|---|\n");
+    views(&t);
     if (test_heap.live) fprintf(stderr, "stability: %zu bytes were never released\n", test_heap.live);
     if (t.broken) fprintf(stderr, "stability: rqt itself fails %d rows\n", t.broken);
     return t.broken || test_heap.live;

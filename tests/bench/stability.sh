@@ -42,6 +42,10 @@ more than half as many vertices again as rqt.
 | padded | the raster is filled up to 2^k + 1 samples with zeros | whatever takes 2^k + 1 only |
 | voids ignored | errors of valid samples alone; leaves with a void corner are left out | |
 
+A second table is of views, hills of 129 x 129 samples 30 m apart seen by a camera of 1600 x 900 pixels. *displacement / tau*: how far a sample is from the mesh at its place in the
+picture when either is drawn, over the tolerance in pixels, the worst of all samples. `ulrich`, `node`, `sphere`, `lindstrom`, `lodmap`: the tests of the literature, each with its own metric
+(METHODS.md, "Views"), stitched by rqt; float32: rqt's mesh by coordinates in single precision. rqt: the guaranteed test.
+
 TEXT
 cat "$table"
 cat <<'TEXT'
