@@ -12,7 +12,7 @@ SANITIZE ?=
 # No fused multiply-adds: the same input gives the same bytes on every machine.
 CFLAGS += -std=gnu11 -g $(OPTIMIZE) $(WARNINGS) -fPIC -ffp-contract=off -fvisibility=hidden -MMD -MP $(SANITIZE)
 CXXFLAGS += -std=c++17 -g $(OPTIMIZE) $(WARNINGS) -fPIC -ffp-contract=off -fvisibility=hidden -MMD -MP $(SANITIZE)
-INCLUDES = -Isrc/core -Isrc/store -Isrc/geo -Isrc/verify -Isrc/format -Isrc/import -Isrc/serve -Iext -I$(BUILD)/generated
+INCLUDES = -Isrc/core -Isrc/store -Isrc/geo -Isrc/verify -Isrc/format -Isrc/import -Isrc/text -Isrc/picture -Isrc/serve -Iext -I$(BUILD)/generated
 
 CORE = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/core/*.c))
 PLAIN = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/verify/*.c src/format/*.c))
@@ -21,6 +21,7 @@ SQL_SOURCES = $(wildcard src/store/*.c ext/*.c)
 SQL_HOSTED = $(patsubst %.c,$(BUILD)/hosted/%.o,$(SQL_SOURCES))
 SQL_LINKED = $(patsubst %.c,$(BUILD)/linked/%.o,$(SQL_SOURCES))
 IMPORT = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/import/*.c))
+PICTURE = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/picture/*.c src/text/*.c))
 SERVE = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/serve/*.c)) $(BUILD)/generated/web_files.o
 CLI = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/cli/*.c))
 # What the query service has in it: the page, and what it says of itself.
@@ -50,7 +51,7 @@ $(BUILD)/librqt.a: $(CORE)
 $(BUILD)/rqt.so: $(SQL_HOSTED) $(PLAIN) $(GEO) $(BUILD)/librqt.a ext/exports.map
 	@echo "  link $@"; $(CXX) $(SANITIZE) -shared -Wl,--version-script=ext/exports.map -Wl,-z,defs -o $@ $(SQL_HOSTED) $(PLAIN) $(GEO) $(BUILD)/librqt.a $(LIBS_EXT)
 
-$(BUILD)/rqt: $(CLI) $(SERVE) $(SQL_LINKED) $(IMPORT) $(PLAIN) $(GEO) $(BUILD)/librqt.a
+$(BUILD)/rqt: $(CLI) $(SERVE) $(PICTURE) $(SQL_LINKED) $(IMPORT) $(PLAIN) $(GEO) $(BUILD)/librqt.a
 	@echo "  link $@"; $(CXX) $(SANITIZE) -o $@ $^ $(LIBS_CLI)
 
 $(BUILD)/hosted/%.o: %.c $(GENERATED)
@@ -62,6 +63,12 @@ $(BUILD)/linked/%.o: %.c $(GENERATED)
 $(BUILD)/import/%.o: src/import/%.c
 	@mkdir -p $(@D)
 	@echo "  compile $<"; $(CC) $(CFLAGS) $(INCLUDES) -DSQLITE_CORE $(GDAL_CFLAGS) -c $< -o $@
+$(BUILD)/text/%.o: src/text/%.c
+	@mkdir -p $(@D)
+	@echo "  compile $<"; $(CC) $(CFLAGS) $(INCLUDES) -DSQLITE_CORE -c $< -o $@
+$(BUILD)/picture/%.o: src/picture/%.c
+	@mkdir -p $(@D)
+	@echo "  compile $<"; $(CC) $(CFLAGS) $(INCLUDES) -DSQLITE_CORE $(CAIRO_CFLAGS) -c $< -o $@
 $(BUILD)/serve/%.o: src/serve/%.c
 	@mkdir -p $(@D)
 	@echo "  compile $<"; $(CC) $(CFLAGS) $(INCLUDES) -DSQLITE_CORE -c $< -o $@

@@ -189,7 +189,9 @@ int camera_make(connection *c, const scene *s, const camera_words *words, rqt_ca
     if (code == SQLITE_OK && words->has_at) code = to_terrain(c, s, words->position, at, "at", error);
     if (code != SQLITE_OK) return code;
     scene_place(s, eye, 1, point);
-    scene_axes(s, eye, east, north, up);
+    scene_axes(s, eye, east, up);
+    for (int i = 0; i < 3; i++)
+        north[i] = up[(i + 1) % 3] * east[(i + 2) % 3] - up[(i + 2) % 3] * east[(i + 1) % 3];
     const double yaw = words->yaw * DEGREE, pitch = words->pitch * DEGREE;
     combine(sin(yaw), east, cos(yaw), north, ahead);
     if (words->has_at) {

@@ -13,6 +13,7 @@ static int answer_read(request *r, double eps, answer *out, char **error) {
     memset(out, 0, sizeof *out);
     r->options.product = RQT_PRODUCT_TRIANGLES;
     r->options.wants_leaves = true;
+    r->options.only_numbers = true;
     if (r->max_vertices == 0)
         return store_query(r->store, r->terrain, r->region, eps, &r->options, &out->patch, &out->reads, error);
     return store_query_within(r->store, r->terrain, r->region, eps, &r->options, r->max_vertices, &r->achieved_eps,

@@ -354,7 +354,8 @@ int rule_read(request *r, char **error) {
                          : r->detail ? "option \"detail\""
                          : border    ? "mode \"border\""
                                      : "option \"frame\"";
-    if (r->options.metric != RQT_METRIC_EXACT && r->options.metric != RQT_METRIC_WEDGIE)
+    const bool may_add = r->options.metric == RQT_METRIC_EXACT || r->options.metric == RQT_METRIC_WEDGIE;
+    if (!may_add && !(r->view && r->test != RQT_VIEW_GUARANTEED))
         return fail(error,
                     "%s needs the metric exact or wedgie: it adds vertices, and with metric \"%s\" nothing is "
                     "proved of a mesh with more of them",

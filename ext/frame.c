@@ -1,5 +1,6 @@
 /* frame.c - the option frame: meshes as points in space, geocentric (ecef) or east, north, up about the terrain's
- * centre (enu). Where the Earth closes on itself, so does the mesh.
+ * centre (enu). Where the Earth closes on itself, so does the mesh. Views of terrains in degrees are in space,
+ * whatever becomes of the answer: their rules have the same needs.
  *
  * Curvature. eps is lowered by what flat triangles of each size are off (geo_frame_sag): then no sample is further
  * than eps from its triangle in space.
@@ -16,9 +17,7 @@
  * Where samples that become one have different heights, vertices move by as much as that, and a plane no more than
  * its corners: so eps is lowered by the largest difference too, and an eps below it is refused.
  */
-#include "functions.h"
-
-#include "geo.h"
+#include "view.h"
 
 #include <math.h>
 #include <string.h>
@@ -164,6 +163,7 @@ static int lower_eps(request *r, space_frame *f, char **error) {
     const store_terrain *t = f->terrain;
     const rqt_placement *at = &t->placement;
     const double x = at->x0 + (t->lattice.width - 1) * at->dx, y = at->y0 + (t->lattice.height - 1) * at->dy;
+    const double exaggeration = r->view ? r->view->scene.exaggeration : 1;
     const double low = rqt_unit_metres(&t->unit, t->min_q), high = rqt_unit_metres(&t->unit, t->max_q);
     const geo_extent extent = {.west = fmin(at->x0, x),
                                .east = fmax(at->x0, x),
@@ -171,67 +171,101 @@ static int lower_eps(request *r, space_frame *f, char **error) {
                                .north = fmax(at->y0, y),
                                .lon_step = fabs(at->dx),
                                .lat_step = fabs(at->dy),
-                               .lowest = fmin(low, high),
-                               .highest = fmax(low, high)};
+                               .lowest = fmin(low, high) * exaggeration,
+                               .highest = fmax(low, high) * exaggeration};
     double lowering[RQT_RANKS];
     geo_frame_sag(f->geo, &extent, RQT_RANKS, lowering);
-    for (int i = 0; i < RQT_RANKS; i++) lowering[i] += f->merging;
+    for (int i = 0; i < RQT_RANKS; i++) lowering[i] = lowering[i] / exaggeration + f->merging;
     return rqt_rule_set_lowering(r->options.rule, lowering) == RQT_OK
                ? SQLITE_OK
                : fail(error, "terrain %s is too large for option \"frame\"", t->name);
 }
 
-int frame_read(request *r, char **error) {
-    if (r->frame_kind == FRAME_CRS) return SQLITE_OK;
+/* What the option wants of the terrain. */
+static int check_option(const request *r, const char *name, char **error) {
     const store_terrain *t = r->terrain;
-    const char *name = r->frame_kind == FRAME_ECEF ? "ecef" : "enu";
     if (!t->lonlat || !t->wgs84)
         return fail(error, "option \"frame\":\"%s\" is for terrains in longitude and latitude on WGS 84; %s is not",
                     name, t->name);
-    const bool geoid = terrain_is_above_geoid(t);
-    if (!geoid && t->vertical[0] && !holds_word(t->vertical, "ellipsoid"))
+    if (!terrain_is_above_geoid(t) && t->vertical[0] && !holds_word(t->vertical, "ellipsoid"))
         return fail(
             error,
             "option \"frame\":\"%s\": the heights of terrain %s are \"%s\"; only heights above the ellipsoid and "
             "above EGM96 can be placed in space",
             name, t->name, t->vertical);
+    return SQLITE_OK;
+}
+
+/* name: of the option; NULL: a view alone needs it. */
+static int create(const request *r, const char *name, space_frame **out, char **error) {
+    const store_terrain *t = r->terrain;
     space_frame *f = sqlite3_malloc(sizeof *f);
+    *out = f;
     if (!f) return SQLITE_NOMEM;
     memset(f, 0, sizeof *f);
-    r->frame = f;
     f->terrain = t;
     const double lon = t->placement.x0 + (t->lattice.width - 1) / 2.0 * t->placement.dx,
                  lat = t->placement.y0 + (t->lattice.height - 1) / 2.0 * t->placement.dy;
-    if (r->frame_kind == FRAME_ECEF)
-        sqlite3_snprintf(sizeof f->title, f->title, "%s, frame ecef", t->name);
-    else
+    if (r->frame_kind == FRAME_ENU)
         sqlite3_snprintf(sizeof f->title, f->title, "%s, frame enu about longitude %!.15g latitude %!.15g height 0",
                          t->name, lon, lat);
+    else
+        sqlite3_snprintf(sizeof f->title, f->title, "%s, frame ecef", t->name);
     char why[256] = "";
-    const int status = geo_frame_create(r->frame_kind == FRAME_ECEF ? GEO_ECEF : GEO_ENU, &GEO_WGS84, lon, lat,
-                                        geoid, &f->geo, why, sizeof why);
+    const geo_ellipsoid ellipsoid = r->view ? r->view->scene.ellipsoid : GEO_WGS84;
+    const int status = geo_frame_create(r->frame_kind == FRAME_ENU ? GEO_ENU : GEO_ECEF, &ellipsoid, lon, lat,
+                                        name && terrain_is_above_geoid(t), &f->geo, why, sizeof why);
     if (status != GEO_OK)
         return status == GEO_NO_MEMORY ? SQLITE_NOMEM : fail(error, "option \"frame\":\"%s\": %s", name, why);
     f->seam = fabs(fabs((t->lattice.width - 1) * t->placement.dx) - 360) < 1e-9 * 360;
     for (int p = 0; p < 2; p++)
         f->pole[p] = fabs(fabs(latitude(t, p ? t->lattice.height - 1 : 0)) - 90) < 1e-9 * 90;
+    return SQLITE_OK;
+}
+
+/* Heights that are one place in space: what is left of the promise. */
+static int check_merging(request *r, const space_frame *f, const char *name, char **error) {
+    if (rule_least_eps(r) < f->merging)
+        return fail(
+            error,
+            "option \"frame\":\"%s\": heights of terrain %s that are one place in space differ by up to %!.15g "
+            "metres; eps must be at least that",
+            name, f->terrain->name, f->merging);
+    const int32_t side = 1 << f->terrain->lattice.K;
+    if (r->view && rqt_field_least(r->view->field, 0, 0, side, side) < f->merging) r->view->guaranteed = false;
+    return SQLITE_OK;
+}
+
+/* The rule is given what the frame takes. */
+static int close_up(request *r, space_frame *f, const char *name, char **error) {
     if (f->seam && r->max_vertices > 0)
         return fail(
             error,
             "option \"max_vertices\" does not go with option \"frame\":\"%s\" on terrain %s, which closes on "
             "itself: what its two rims need depends on eps",
-            name, t->name);
+            name, f->terrain->name);
     int code = f->seam ? read_seam(r, f, error) : SQLITE_OK;
-    for (int p = 0; p < 2 && code == SQLITE_OK; p++)
+    for (int p = 0; p < 2 && code == SQLITE_OK && name; p++)
         if (f->pole[p]) code = read_pole(r, f, p, error);
-    if (code == SQLITE_OK && rule_least_eps(r) < f->merging)
-        code = fail(
-            error,
-            "option \"frame\":\"%s\": heights of terrain %s that are one place in space differ by up to %!.15g "
-            "metres; eps must be at least that",
-            name, t->name, f->merging);
+    if (!name) f->merging = 0; /* nothing is merged */
+    if (code == SQLITE_OK && name) code = check_merging(r, f, name, error);
     if (code == SQLITE_OK) code = lower_eps(r, f, error);
-    if (code == SQLITE_OK && f->seam) code = close_seam(r, f, error);
+    return code == SQLITE_OK && f->seam ? close_seam(r, f, error) : code;
+}
+
+int frame_read(request *r, char **error) {
+    static const char *const names[] = {NULL, "ecef", "enu"};
+    const char *name = names[r->frame_kind];
+    if (!name && !(r->view && r->terrain->lonlat)) return SQLITE_OK;
+    int code = name ? check_option(r, name, error) : SQLITE_OK;
+    if (code != SQLITE_OK) return code;
+    space_frame *f = NULL;
+    code = create(r, name, &f, error);
+    if (code == SQLITE_OK) code = close_up(r, f, name, error);
+    if (name)
+        r->frame = f;
+    else
+        frame_free(f);
     return code;
 }
 

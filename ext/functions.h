@@ -83,13 +83,15 @@ typedef struct request {
     request_mode mode;
     double eps;
     store_query_options options;
-    struct cJSON *detail;  /* the option, as it came; NULL: none */
-    places *places;        /* what it says; detail.c */
-    frame_kind frame_kind; /* where the mesh is drawn */
-    space_frame *frame;    /* NULL for FRAME_CRS; frame.c */
-    bool fans;             /* the strip goes round the centres of blocks */
-    int64_t max_vertices;  /* 0: any number */
-    double achieved_eps;   /* of the mesh: eps, or more to keep within max_vertices; known after request_patch */
+    struct cJSON *detail;      /* the option, as it came; NULL: none */
+    places *places;            /* what it says; detail.c */
+    frame_kind frame_kind;     /* where the mesh is drawn */
+    space_frame *frame;        /* NULL for FRAME_CRS; frame.c */
+    bool fans;                 /* the strip goes round the centres of blocks */
+    int64_t max_vertices;      /* 0: any number */
+    rqt_view_test test;        /* of a view */
+    bool has_test, has_metric; /* the options name one */
+    double achieved_eps; /* of the mesh: eps, or more to keep within max_vertices; known after request_patch */
     view *view; /* NULL, or the view that is asked for: then the region is what may be seen, and eps is infinite */
 } request;
 

@@ -23,7 +23,7 @@ static const choice choices[] = {
     {"max_triangles", "", "*"},
     {"previous", "", "*"},
     {"frame", " crs ecef enu ", ""},
-    {"test", "", "*"},
+    {"test", " guaranteed ulrich node sphere lindstrom lodmap ", ""},
 };
 
 static bool holds(const char *words, const char *word) {
@@ -71,7 +71,8 @@ static int read_one(const cJSON *item, request *r, char **error) {
     if (strcmp(c->key, "frame") == 0) r->frame_kind = (frame_kind)index_of(c, value);
     if (strcmp(c->key, "outline") == 0) r->options.outline = (rqt_outline)index_of(c, value);
     if (strcmp(c->key, "select") == 0) r->options.select = (rqt_select)index_of(c, value);
-    if (strcmp(c->key, "metric") == 0) r->options.metric = (rqt_metric)index_of(c, value);
+    if (strcmp(c->key, "metric") == 0) r->options.metric = (rqt_metric)index_of(c, value), r->has_metric = true;
+    if (strcmp(c->key, "test") == 0) r->test = (rqt_view_test)index_of(c, value), r->has_test = true;
     if (strcmp(c->key, "strip") == 0) r->fans = strcmp(value, "fan") == 0;
     return SQLITE_OK;
 }

@@ -65,6 +65,7 @@ static int open(connection *c, sqlite3_value *terrain, sqlite3_value *options, r
             fail(error, "option \"%s\" does not go with mode \"cut\"", r->fans ? "strip\":\"fan" : "max_vertices");
     if (code == SQLITE_OK && r->mode == REQUEST_CUT && r->frame_kind != FRAME_CRS)
         code = fail(error, "option \"frame\" does not go with mode \"cut\"");
+    if (code == SQLITE_OK && r->has_test && !r->view) code = fail(error, "option \"test\" is for views");
     if (code == SQLITE_OK) code = connection_store(c, &r->store, error);
     if (code == SQLITE_OK) r->connection = c;
     if (code == SQLITE_OK) code = request_terrain(r->store, terrain, &r->terrain, error);

@@ -20,13 +20,26 @@ void view_free(view *v) {
     sqlite3_free(v);
 }
 
-int view_place(request *r, char **error) {
-    view *v = r->view;
+/* What the options may say of a view. */
+static int check_options(request *r, char **error) {
+    const char *test = rqt_view_test_name(r->test);
     if (r->mode != REQUEST_COVER) return fail(error, "option \"mode\" of a view must be cover");
     if (r->max_vertices > 0) return fail(error, "option \"max_vertices\" does not go with a view");
-    int code = scene_create(&v->scene, r->terrain, v->words.exaggeration, error);
-    if (code == SQLITE_OK) code = camera_make(r->connection, &v->scene, &v->words, &v->camera, error);
-    if (code == SQLITE_OK) code = view_field(r, v, &r->region, error);
+    if (r->test == RQT_VIEW_GUARANTEED) return SQLITE_OK;
+    if (r->has_metric)
+        return fail(error, "option \"metric\" does not go with \"test\":\"%s\", which is about the metric %s", test,
+                    rqt_metric_name(rqt_view_test_metric(r->test)));
+    r->options.metric = rqt_view_test_metric(r->test);
+    return SQLITE_OK;
+}
+
+int view_place(request *r, char **error) {
+    view *v = r->view;
+    int code = check_options(r, error);
+    const bool geoid = r->frame_kind != FRAME_CRS && terrain_is_above_geoid(r->terrain);
+    v->test = r->test;
     v->guaranteed = v->test == RQT_VIEW_GUARANTEED;
-    return code;
+    if (code == SQLITE_OK) code = scene_create(&v->scene, r->terrain, v->words.exaggeration, geoid, error);
+    if (code == SQLITE_OK) code = camera_make(r->connection, &v->scene, &v->words, &v->camera, error);
+    return code == SQLITE_OK ? view_field(r, v, &r->region, error) : code;
 }

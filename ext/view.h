@@ -21,21 +21,22 @@ typedef struct scene {
     double metre;        /* planar: metres in a unit of x and y */
     geo_frame *space;    /* NULL: planar */
     geo_ellipsoid ellipsoid;
+    geo_geoid geoid; /* under the terrain; 0 where heights are taken as above the ellipsoid */
 } scene;
 
-int scene_create(scene *s, const store_terrain *t, double exaggeration, char **error);
+/* geoid: heights of a terrain in degrees are above EGM96. */
+int scene_create(scene *s, const store_terrain *t, double exaggeration, bool geoid, char **error);
 void scene_free(scene *s);
 /* A geocentric place as longitude, latitude and the height that the terrain would give it. `what`: for sentences.
  */
 int scene_from_geocentric(const scene *s, double place[3], const char *what, char **error);
 /* Where x, y of the terrain's CRS and a height in metres are in the scene. `exaggeration`: of this height. */
 void scene_place(const scene *s, const double place[3], double exaggeration, double point[3]);
-/* East, north and up there: unit. In a projected system grid east and grid north. */
-void scene_axes(const scene *s, const double place[3], double east[3], double north[3], double up[3]);
-/* A piece of the scene that holds all samples of columns x0 .. x1, rows y0 .. y1 whose heights are in range
- * (metres, not exaggerated). scene.c has the proof. */
-void scene_prism(const scene *s, int32_t x0, int32_t y0, int32_t x1, int32_t y1, const double range[2],
-                 rqt_prism *prism);
+/* East and up there: unit; north is up x east. In a projected system grid east and grid north. */
+void scene_axes(const scene *s, const double place[3], double east[3], double up[3]);
+/* A piece of the scene that holds all samples of a square, as far as there is terrain, whose heights are lowest ..
+ * highest (metres, not exaggerated). scene.c has the proof. */
+void scene_piece(const scene *s, rqt_square square, double lowest, double highest, rqt_view_piece *piece);
 
 /* ----------------------------------------------------------------------------------------------- camera */
 typedef enum camera_position { CAMERA_CRS, CAMERA_LONLAT, CAMERA_ECEF } camera_position;

@@ -580,4 +580,22 @@ static inline void place_rectangle(trial *t, double eps, int x0, int y0, int x1,
     t->place_eps[t->places++] = eps;
 }
 
+/* The triangles of a terrain by a rule, or by an eps alone. */
+static inline key *keys_of_rule(trial *t, int k, const rqt_rule *rule, rqt_code eps, size_t *count) {
+    database d;
+    rqt_patch patch;
+    const window all = window_all();
+    rqt_region *region = region_of(&all, &t->m.grid.lattice);
+    assert_int_equal(database_create(&d, &t->m, k, &test_allocator), RQT_OK);
+    d.rule = rule;
+    assert_int_equal(
+        database_query(&d, region, eps, RQT_SELECT_THRESHOLD, RQT_OUTLINE_EXACT, &test_allocator, &patch), RQT_OK);
+    key *keys = keys_of_patch(&patch, t->m.r.width);
+    *count = patch.triangle_count;
+    rqt_patch_free(&patch);
+    rqt_region_free(region);
+    database_free(&d, &test_allocator);
+    return keys;
+}
+
 #endif

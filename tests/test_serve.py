@@ -101,6 +101,16 @@ answer = ask(HILLS + "/delta", {"wkt": WKT, "eps_from": 20, "eps_to": 10})
 equal("delta is rqt_delta's bytes", (answer.content_type, answer.body),
       ("application/vnd.rqt.delta", sql_bytes("SELECT rqt_delta(?1, 20, 10, 'hills')", WKT)))
 
+said, status = s.run([s.RQT, "mesh", DB, "--terrain", "hills", "--eps", "20", "--region", BOX, "--width", "1200", "-o", s.temp("picture.svg")])
+equal("(rqt mesh)", (said, status), ("", 0))
+with open(s.temp("picture.svg"), "rb") as f:
+    picture = f.read()
+answer = ask(HILLS + "/range", {"bbox": BOX, "eps": 20, "f": "svg"})
+equal("svg is the picture that rqt mesh draws", (answer.status, answer.content_type, answer.body == picture and len(picture) > 10000), (200, "image/svg+xml", True))
+answer = ask(HILLS + "/range", {"wkt": "POINT(0 0)", "eps": 20, "f": "svg"})
+check("of what is elsewhere there is none", answer.status == 400 and "there is nothing to draw" in answer.detail(), answer.body)
+check("nor of a view", "a view has no format" in ask(HILLS + "/view", {"camera": CAMERA, "f": "svg"}).detail())
+
 # ------------------------------------------------------------------------------------------------- heights and insight
 for x, y, eps in ((-71.3033, 44.2705, 0), (-71.3033, 44.2705, 20), (-71.5, 44.5, 3.5), (10, 10, 0)):
     answer = ask(HILLS + "/height", {"x": x, "y": y, "eps": eps})

@@ -55,9 +55,16 @@ static bool exists(const rqt_lattice *lattice, rqt_square s) {
     return (s.x == 0 || s.x < lattice->width - 1) && (s.y == 0 || s.y < lattice->height - 1);
 }
 
+/* The largest float that is not above eps >= 0. */
 static float float_below(double eps) {
-    const float f = (float)eps;
-    return (double)f > eps ? (float)nextafter((double)f, 0) : f;
+    float f = (float)eps;
+    if ((double)f > eps) { /* so it is above 0: the float before has the bits before */
+        uint32_t bits;
+        memcpy(&bits, &f, sizeof bits);
+        bits--;
+        memcpy(&f, &bits, sizeof f);
+    }
+    return f;
 }
 
 static rqt_status make_node(making *m, size_t at, rqt_square s) {
@@ -170,9 +177,12 @@ typedef struct open_box {
     int32_t x0, y0, x1, y1;
 } open_box;
 
+static inline bool square_meets(rqt_square s, const open_box *box) {
+    return s.x < box->x1 && s.x + s.side > box->x0 && s.y < box->y1 && s.y + s.side > box->y0;
+}
+
 static rqt_code least_in(const rqt_field *field, const node *n, rqt_square s, const open_box *box, rqt_code least) {
-    if (n->least >= least || s.x >= box->x1 || s.x + s.side <= box->x0 || s.y >= box->y1 || s.y + s.side <= box->y0)
-        return least;
+    if (n->least >= least || !square_meets(s, box)) return least;
     if (n->kind == LEAF || (s.x >= box->x0 && s.x + s.side <= box->x1 && s.y >= box->y0 && s.y + s.side <= box->y1))
         return n->least;
     for (int c = 0; c < 4; c++)
@@ -211,34 +221,42 @@ typedef struct painting {
     open_box box; /* of all cells */
 } painting;
 
+/* n values of the same, row by row. The rows are short: two cells, or a power of two. */
+static inline __attribute__((always_inline)) void fill(uint16_t *row, int32_t n, uint16_t value) {
+    const uint64_t four = value * UINT64_C(0x0001000100010001);
+    const uint64_t many[4] = {four, four, four, four};
+    for (; n >= 16; n -= 16, row += 16) memcpy(row, many, sizeof many);
+    for (; n >= 4; n -= 4, row += 4) memcpy(row, &four, sizeof four);
+    for (; n > 0; n--) *row++ = value;
+}
+
 static void paint_node(const painting *p, const node *n, rqt_square s) {
     const open_box *box = &p->box;
-    if (n->least == RQT_CODE_INFINITY || s.x >= box->x1 || s.x + s.side <= box->x0 || s.y >= box->y1 ||
-        s.y + s.side <= box->y0)
-        return;
-    if (n->kind == SPLIT && s.side > p->cells->side) {
-        for (int c = 0; c < 4; c++) paint_node(p, &p->field->nodes[n->first + (uint32_t)c], quarter(s, c));
+    const int scale = p->cells->scale;
+    if (n->kind == SPLIT && s.side >> scale > 1) {
+        for (int c = 0; c < 4; c++) {
+            const node *child = &p->field->nodes[n->first + (uint32_t)c];
+            const rqt_square part = quarter(s, c);
+            if (child->least != RQT_CODE_INFINITY && square_meets(part, box)) paint_node(p, child, part);
+        }
         return;
     }
     /* Whole cells: all sides are powers of two, and what is smaller than a cell is not come to. */
-    const int32_t side = p->cells->side;
-    const int32_t left = s.x > box->x0 ? (s.x - box->x0) / side : 0,
-                  top = s.y > box->y0 ? (s.y - box->y0) / side : 0;
-    const int32_t right = s.x + s.side < box->x1 ? (s.x + s.side - box->x0) / side : p->cells->n,
-                  bottom = s.y + s.side < box->y1 ? (s.y + s.side - box->y0) / side : p->cells->n;
+    const int32_t left = s.x > box->x0 ? (s.x - box->x0) >> scale : 0,
+                  top = s.y > box->y0 ? (s.y - box->y0) >> scale : 0;
+    const int32_t right = s.x + s.side < box->x1 ? (s.x + s.side - box->x0) >> scale : p->cells->n,
+                  bottom = s.y + s.side < box->y1 ? (s.y + s.side - box->y0) >> scale : p->cells->n;
     const uint16_t value = p->value(p->context, n->least);
-    for (int32_t y = top; y < bottom; y++) {
-        uint16_t *row = p->painted + (size_t)y * (size_t)p->cells->n;
-        for (int32_t x = left; x < right; x++) row[x] = value;
-    }
+    for (int32_t y = top; y < bottom; y++)
+        fill(p->painted + (size_t)y * (size_t)p->cells->n + left, right - left, value);
 }
 
 void field_paint(const rqt_field *field, const field_cells *cells,
                  uint16_t (*value)(const void *context, rqt_code code), const void *context, uint16_t *painted) {
-    const int32_t across = cells->n * cells->side;
+    const int32_t across = cells->n << cells->scale;
     const painting p = {field,   cells,   value,
                         context, painted, {cells->x, cells->y, cells->x + across, cells->y + across}};
     const uint16_t nothing = value(context, RQT_CODE_INFINITY);
-    for (size_t i = 0; i < (size_t)cells->n * (size_t)cells->n; i++) painted[i] = nothing;
-    paint_node(&p, &field->nodes[0], root_of(field));
+    fill(painted, cells->n * cells->n, nothing);
+    if (field->nodes[0].least != RQT_CODE_INFINITY) paint_node(&p, &field->nodes[0], root_of(field));
 }

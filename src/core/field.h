@@ -10,11 +10,10 @@ rqt_code field_least(const rqt_field *field, int32_t x0, int32_t y0, int32_t x1,
 /* The code of the square that holds the box, or RQT_CODE_INFINITY: none does. */
 rqt_code field_holding(const rqt_field *field, int32_t x0, int32_t y0, int32_t x1, int32_t y1);
 
-/* n * n cells, side by side from (x,y) on, which are multiples of their side, a power of two not above the root's.
- */
+/* n * n cells of side 2^scale, side by side from (x,y) on, which are multiples of it; not larger than the root. */
 typedef struct field_cells {
-    int32_t x, y, side;
-    int n;
+    int32_t x, y;
+    int scale, n;
 } field_cells;
 /* For each cell value(context, c), c the least code of the squares that have a point in common with its interior.
  * value is asked once for the cells that a square holds, not for each. */

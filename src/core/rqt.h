@@ -597,10 +597,10 @@ rqt_status rqt_rule_force_border(rqt_rule *rule, const rqt_region *region, bool 
                                  void *context);
 
 /* An eps for every place: a *field* cuts the root square into quarters of quarters, as finely as it is told to, and
- * has an eps in each square that is left. To a rule its squares are places, but open ones: threshold(P) is the code
- * of the least eps of all squares that have a point in common with the interior of box(P), where neither the rule's
- * own eps nor its other places say less. A sample on the side of a square so gets the least eps of all squares
- * there. Views (rqt_view.h) are such fields. */
+ * has an eps in each square that is left. To a rule its squares are places, but open ones: threshold(P) takes in
+ * the least eps of all squares that have a point in common with the interior of box(P), beside the rule's own eps
+ * and its other places. A sample on the side of a square so gets the least eps of all squares there. Views
+ * (rqt_view.h) are such fields. */
 typedef struct rqt_field rqt_field;
 
 typedef struct rqt_square {
@@ -609,21 +609,26 @@ typedef struct rqt_square {
 
 typedef enum rqt_field_step { RQT_FIELD_LEAF, RQT_FIELD_SPLIT, RQT_FIELD_FAIL } rqt_field_step;
 /* What becomes of a square: *eps (metres, not NaN, >= 0; infinity: nothing is asked for there) for all of it, or
- * its quarters are asked for, each at once with all that is in it. A square of side 1 cannot be split:
- * RQT_FIELD_SPLIT is an error there. Squares that hold no sample are not asked for. */
+ * its quarters are asked for, each at once with all that is in it, in Morton order. A square of side 1 cannot be
+ * split: RQT_FIELD_SPLIT is an error there. Squares exist where blocks do: those whose north-west corner is on or
+ * past the last column or row are not asked for (in a raster of one column or row: all but the first), for what
+ * they share with the raster is on the side of another. */
 typedef rqt_field_step rqt_field_decide(void *context, rqt_square square, double *eps);
-/* RQT_READ_FAILED after RQT_FIELD_FAIL; RQT_INVALID for an eps that is none. About 16 bytes a square. */
+/* RQT_READ_FAILED after RQT_FIELD_FAIL; RQT_INVALID for an eps that is none, or side 1 split. 16 to 32
+ * bytes a square. */
 rqt_status rqt_field_create(const rqt_lattice *lattice, const rqt_allocator *allocator, rqt_field_decide *decide,
                             void *context, rqt_field **field);
 void rqt_field_free(rqt_field *field);
-/* Every eps becomes what it was when the field was made, times factor: > 0, finite. */
+/* Every eps becomes what it was when the field was made, as the float below it, times factor: > 0, finite (else
+ * RQT_INVALID); rounded down to a code. */
 rqt_status rqt_field_scale(rqt_field *field, double factor);
-/* The squares that are left, in Morton order; false: there is no nth. eps is rounded down to a code, as used. */
+/* The squares that are left, in Morton order; false: there is no nth. eps is that of the code, as used. O(K). */
 size_t rqt_field_count(const rqt_field *field);
 bool rqt_field_square(const rqt_field *field, size_t n, rqt_square *square, double *eps);
 /* The least eps of the squares that have a point in common with the open box; infinity where there is none. */
 double rqt_field_least(const rqt_field *field, int32_t x0, int32_t y0, int32_t x1, int32_t y1);
-/* The field must outlive the rule, or the next call of this; NULL: none. After rqt_field_scale: say it again. */
+/* The field must outlive the rule, or the next call of this; NULL: none. rqt_field_scale changes what the rule
+ * selects, at once: not while a query runs. RQT_INVALID for a field over another raster. */
 rqt_status rqt_rule_set_field(rqt_rule *rule, const rqt_field *field);
 
 /* The largest code that an error may have without the vertex being selected for it; -1: none. */

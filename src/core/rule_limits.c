@@ -11,7 +11,7 @@
 #include "field.h"
 #include "rule.h"
 
-enum { MARGIN = 2, SIDE_WINDOW = 2 * MARGIN, CENTRE_WINDOW = SIDE_WINDOW + 2 };
+enum { MARGIN = 2, WINDOW = 2 * MARGIN };
 
 typedef struct asking {
     const rqt_rule *rule;
@@ -23,32 +23,36 @@ static uint16_t limit_of(const void *context, rqt_code code) {
     return (uint16_t)(rule_field_threshold(a->rule, code, a->rank) + 1);
 }
 
-/* to[i] = the least of `width` values of from, `step` apart from i on. */
-static inline __attribute__((always_inline)) void least_of(const uint16_t *restrict from, size_t step, int width,
-                                                           size_t count, uint16_t *restrict to) {
+/* to[i] = the least of the values of a window, `step` apart from i on. */
+static inline __attribute__((always_inline)) void least_of(const uint16_t *restrict from, size_t step, size_t count,
+                                                           uint16_t *restrict to) {
     for (size_t i = 0; i < count; i++) {
         uint16_t least = from[i];
-        for (int w = 1; w < width; w++) {
-            const uint16_t other = from[i + (size_t)w * step];
+        for (size_t w = 1; w < WINDOW; w++) {
+            const uint16_t other = from[i + w * step];
             least = other < least ? other : least;
         }
         to[i] = least;
     }
 }
 
-/* Windows of side_cells squared, by their first cells. room: as large as the grid. */
+/* Four by four cells, by the first of them, of a grid of n by n. */
 VECTOR_CLONES
-static void side_windows(const uint16_t *grid, size_t n, uint16_t *room, uint16_t *windows) {
-    const size_t rows = n - SIDE_WINDOW + 1, last = SIDE_WINDOW - 1;
-    least_of(grid, n, SIDE_WINDOW, rows * n, room);
-    least_of(room, 1, SIDE_WINDOW, rows * n - last, windows);
+static void take_windows(const uint16_t *grid, size_t n, uint16_t *room, uint16_t *windows) {
+    const size_t rows = n - WINDOW + 1;
+    least_of(grid, n, rows * n, room);
+    least_of(room, 1, rows * n - (WINDOW - 1), windows);
 }
 
+/* Six by six: four windows that lie two cells apart. */
 VECTOR_CLONES
-static void centre_windows(const uint16_t *grid, size_t n, uint16_t *room, uint16_t *windows) {
-    const size_t rows = n - CENTRE_WINDOW + 1, last = CENTRE_WINDOW - 1;
-    least_of(grid, n, CENTRE_WINDOW, rows * n, room);
-    least_of(room, 1, CENTRE_WINDOW, rows * n - last, windows);
+static void take_wide_windows(const uint16_t *restrict windows, size_t n, uint16_t *restrict wide) {
+    const size_t rows = n - WINDOW - 1, count = rows * n - (WINDOW + 1);
+    for (size_t i = 0; i < count; i++) {
+        const uint16_t a = windows[i], b = windows[i + 2], c = windows[i + 2 * n], d = windows[i + 2 * n + 2];
+        const uint16_t one = a < b ? a : b, other = c < d ? c : d;
+        wide[i] = one < other ? one : other;
+    }
 }
 
 size_t rule_limits_room(int k) {
@@ -62,22 +66,31 @@ void rule_limits(const rqt_rule *rule, const rqt_block_place *place, int k, uint
     for (int scale = 0; scale < k; scale++) {
         const size_t step = (size_t)1 << scale, cells = (size_t)1 << (k - scale), n = cells + 2 * MARGIN;
         uint16_t *const grid = room, *const columns = room + n * n, *const windows = room + 2 * n * n;
-        const int32_t side = place->stride << scale;
-        const field_cells where = {place->x - MARGIN * side, place->y - MARGIN * side, side, (int)n};
-        asking a = {rule, 2 * __builtin_ctz((unsigned)side)};
-        /* Vertices on sides; the others of the grid are those of coarser scales, and centres, which come later. */
+        const int q = __builtin_ctz((unsigned)place->stride) + scale;
+        const field_cells where = {place->x - (MARGIN << q), place->y - (MARGIN << q), q, (int)n};
+        asking a = {rule, 2 * q};
         field_paint(field, &where, limit_of, &a, grid);
-        side_windows(grid, n, columns, windows);
+        take_windows(grid, n, columns, windows);
+        /* Even rows hold vertices on sides between those of coarser scales, which come later, odd ones centres
+         * between vertices on sides. */
         for (size_t y = 0; y <= cells; y++) {
             uint16_t *const row = limits + y * step * across;
-            for (size_t x = 0; x <= cells; x++) row[x * step] = windows[y * n + x];
+            const uint16_t *const from = windows + y * n;
+            if (step == 1)
+                memcpy(row, from, across * sizeof *row);
+            else
+                for (size_t x = y % 2 ? 0 : 1; x <= cells; x += 2) row[x * step] = from[x];
         }
-        a.rank++;
-        if (rule_lowers(rule)) field_paint(field, &where, limit_of, &a, grid);
-        centre_windows(grid, n, columns, windows);
+        if (rule_lowers(rule)) {
+            a.rank++;
+            field_paint(field, &where, limit_of, &a, grid);
+            take_windows(grid, n, columns, windows);
+        }
+        take_wide_windows(windows, n, columns);
         for (size_t y = 1; y < cells; y += 2) {
             uint16_t *const row = limits + y * step * across;
-            for (size_t x = 1; x < cells; x += 2) row[x * step] = windows[(y - 1) * n + x - 1];
+            const uint16_t *const from = columns + (y - 1) * n;
+            for (size_t x = 1; x < cells; x += 2) row[x * step] = from[x - 1];
         }
     }
 }

@@ -164,6 +164,11 @@ extern "C" void geo_frame_lonlath(const geo_frame *frame, const double xyz[3], d
     lonlath[2] = h - (frame->geoid ? frame->undulation(lon, lat) : 0);
 }
 
+extern "C" geo_geoid geo_frame_geoid(const geo_frame *frame, const geo_extent *e) {
+    const relief geoid = frame->measure(*e);
+    return {geoid.lon, geoid.lat, std::max(std::fabs(geoid.low), std::fabs(geoid.high))};
+}
+
 extern "C" void geo_frame_sag(const geo_frame *frame, const geo_extent *e, int ranks, double *metres) {
     const geo_ellipsoid &ellipsoid = frame->ellipsoid;
     const double e2 = ellipsoid.f * (2 - ellipsoid.f);

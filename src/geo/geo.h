@@ -108,6 +108,13 @@ void geo_frame_place(const geo_frame *frame, const double lonlath[3], double xyz
 /* Back. */
 void geo_frame_lonlath(const geo_frame *frame, const double xyz[3], double lonlath[3]);
 
+/* The geoid over an extent, which is looked at for longitudes and latitudes alone: metres per degree, at most,
+ * along each, and the largest |undulation|. All 0 without one. */
+typedef struct geo_geoid {
+    double lon_slope, lat_slope, most;
+} geo_geoid;
+geo_geoid geo_frame_geoid(const geo_frame *frame, const geo_extent *extent);
+
 /* How far a mesh in space may be from what it is in lon,lat,height: for each rank of split vertices (2 * scale for
  * the midpoint of a side of 2^(scale+1) samples, 2 * scale + 1 for the centre of such a square), an upper bound, in
  * metres, of the distance between any place of a triangle that is straight in lon,lat,height and the same place of

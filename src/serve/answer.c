@@ -124,8 +124,7 @@ static bool is_damage(int code) {
     }
 }
 
-void answer_database_problem(request *r, sqlite3 *db, int code) {
-    const char *sentence = db ? sqlite3_errmsg(db) : sqlite3_errstr(code);
+void answer_failure(request *r, int code, const char *sentence) {
     switch (code & 0xFF) {
     case SQLITE_INTERRUPT:
         if (pool_is_hurried(r->service->pool))

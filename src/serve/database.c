@@ -106,7 +106,7 @@ static bool open_database(database *d, request *r) {
         close_database(d);
     }
     if (code == SQLITE_OK && d->db) return true;
-    answer_database_problem(r, d->db, code);
+    answer_failure(r, code, d->db ? sqlite3_errmsg(d->db) : sqlite3_errstr(code));
     close_database(d);
     return false;
 }
@@ -158,7 +158,7 @@ bool database_begin(database *d, request *r, uint64_t *state) {
         bool is_wal;
         const int code = begin_reading(d);
         if (code != SQLITE_OK) {
-            answer_database_problem(r, d->db, code);
+            answer_failure(r, code, d->db ? sqlite3_errmsg(d->db) : sqlite3_errstr(code));
             close_database(d);
             return false;
         }
@@ -190,7 +190,7 @@ sqlite3_stmt *database_prepare(database *d, request *r, const char *sql) {
     sqlite3_stmt *statement = NULL;
     const int code = sqlite3_prepare_v3(d->db, sql, -1, SQLITE_PREPARE_PERSISTENT, &statement, NULL);
     if (code != SQLITE_OK) {
-        database_failed(d, r, code);
+        database_failed(d, r, code, NULL);
         return NULL;
     }
     d->kept[d->kept_count].sql = sql;
@@ -198,8 +198,12 @@ sqlite3_stmt *database_prepare(database *d, request *r, const char *sql) {
     return statement;
 }
 
-void database_failed(database *d, request *r, int code) {
-    answer_database_problem(r, d->db, code);
+sqlite3 *database_handle(database *d) {
+    return d->db;
+}
+
+void database_failed(database *d, request *r, int code, const char *sentence) {
+    answer_failure(r, code, sentence ? sentence : sqlite3_errmsg(d->db));
     /* Also where memory ran out: what the connection keeps of blocks goes with it. */
     d->is_damaged = r->answer.status == MHD_HTTP_INTERNAL_SERVER_ERROR || (code & 0xFF) == SQLITE_NOMEM;
 }

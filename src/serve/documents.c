@@ -144,7 +144,7 @@ void answer_collection(worker *w, request *r) {
         if (code == SQLITE_ROW)
             answer_json(r, JSON, collection_of(row));
         else
-            database_failed(t.database, r, code);
+            database_failed(t.database, r, code, NULL);
     }
     terrain_end(&t);
 }
@@ -167,7 +167,7 @@ static bool add_terrains(database *d, request *r, cJSON *collections) {
         if (!holds(collections, (const char *)sqlite3_column_text(rows, NAME)))
             cJSON_AddItemToArray(collections, collection_of(rows));
     if (code == SQLITE_DONE) return true;
-    database_failed(d, r, code);
+    database_failed(d, r, code, NULL);
     return false;
 }
 

@@ -144,7 +144,7 @@ static found find_terrain(database *d, request *r, terrain *t) {
     const int code = sqlite3_step(row);
     if (code == SQLITE_DONE) return NOT_HERE;
     if (code != SQLITE_ROW) {
-        database_failed(d, r, code);
+        database_failed(d, r, code, NULL);
         return FAILED;
     }
     t->srid = sqlite3_column_int(row, 0);

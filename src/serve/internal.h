@@ -99,8 +99,8 @@ bool target_read(request *r);
 void answer_clear(request *r);
 /* Instead of what the answer has so far: application/problem+json, with a sentence. */
 void answer_problem(request *r, unsigned status, const char *format, ...) __attribute__((format(printf, 3, 4)));
-/* The same for what SQLite says of this connection (NULL: of the code). */
-void answer_database_problem(request *r, sqlite3 *db, int code);
+/* The same for a code of SQLite and what it says. */
+void answer_failure(request *r, int code, const char *sentence);
 /* A cJSON object, which it releases, as the whole answer. NULL: no memory. */
 void answer_json(request *r, const char *type, cJSON *json);
 /* A column as a value of JSON; the row's columns from..to-1 as members of a JSON array: numbers and texts. */
@@ -129,9 +129,10 @@ bool database_begin(database *d, request *r, uint64_t *state);
 void database_end(database *d);
 /* A statement of this text (static), ready to be bound; kept for the next time. NULL: the answer says why. */
 sqlite3_stmt *database_prepare(database *d, request *r, const char *sql);
-/* A statement of its has failed with this code: the answer says how. A connection that met damage is closed with
- * database_end, and so is one without memory, whose blocks then go. */
-void database_failed(database *d, request *r, int code);
+sqlite3 *database_handle(database *d);
+/* Something has failed with this code; sentence NULL: what the connection says of it. It becomes the answer. A
+ * connection that met damage is closed with database_end, and so is one without memory, whose blocks then go. */
+void database_failed(database *d, request *r, int code, const char *sentence);
 /* The file's name without its folder. */
 const char *database_label(const database *d);
 /* count connections, none open yet. */
@@ -190,9 +191,10 @@ void terrain_end(terrain *t);
 typedef struct query {
     const request *request;
     char *options;      /* JSON; NULL: none */
-    const char *region; /* as text; NULL: everything, or a box */
-    void *box;          /* as a geometry; NULL: none */
+    const char *region; /* as text; NULL: everything */
+    void *box;          /* of a box: the geometry; NULL: none. Its text is outline */
     int size;           /* bytes of box */
+    char outline[256];
     const char *format; /* as SQL has it */
 } query;
 /* False: what is wrong is the answer. */

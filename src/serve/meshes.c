@@ -3,12 +3,16 @@
  */
 #include "internal.h"
 
+#include "picture.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-typedef enum shape { SHAPE_ROWS, SHAPE_FEATURES, SHAPE_BYTES } shape;
+typedef enum shape { SHAPE_ROWS, SHAPE_FEATURES, SHAPE_BYTES, SHAPE_PICTURE } shape;
+
+enum { PICTURE_WIDTH = 1200 };
 
 typedef struct mesh_format {
     const char *name; /* of parameter f, and of SQL's format */
@@ -30,6 +34,7 @@ static const mesh_format FORMATS[] = {
     {"strip", "application/vnd.rqt.strip", SHAPE_BYTES, false},
     {"indexed", "application/vnd.rqt.indexed", SHAPE_BYTES, false},
     {"wkb", "application/vnd.rqt.wkb", SHAPE_BYTES, false},
+    {"svg", "image/svg+xml", SHAPE_PICTURE, false},
 };
 enum { FORMAT_COUNT = sizeof FORMATS / sizeof *FORMATS };
 
@@ -137,6 +142,30 @@ static int write_bytes(request *r, sqlite3_stmt *row) {
     return SQLITE_DONE;
 }
 
+static bool put_bytes(void *context, const void *bytes, size_t size) {
+    buffer *b = context;
+    buffer_add(b, bytes, size);
+    return !b->is_over && !b->no_memory;
+}
+
+/* What `rqt mesh -o x.svg` draws. */
+static void draw(request *r, const terrain *t, const query *q) {
+    double eps = 0;
+    char *sentence = NULL;
+    (void)number_read(request_parameter(r, "eps"), &eps);
+    const picture_request picture = {.region = q->region,
+                                     .eps = &eps,
+                                     .count = 1,
+                                     .terrain = r->terrain,
+                                     .options = q->options,
+                                     .width = PICTURE_WIDTH,
+                                     .svg = true};
+    const int code = picture_write(database_handle(t->database), &picture, put_bytes, &r->answer.body, &sentence);
+    if (code != SQLITE_OK && !r->answer.body.is_over && !r->answer.body.no_memory)
+        database_failed(t->database, r, code, sentence ? sentence : sqlite3_errstr(code));
+    sqlite3_free(sentence);
+}
+
 static void run(request *r, const terrain *t, const mesh_kind *kind, const mesh_format *f, const query *q) {
     const char *sql = f->shape == SHAPE_ROWS       ? kind->rows
                       : f->shape == SHAPE_FEATURES ? kind->triangles
@@ -147,7 +176,7 @@ static void run(request *r, const terrain *t, const mesh_kind *kind, const mesh_
     const int code = f->shape == SHAPE_ROWS       ? write_rows(r, statement)
                      : f->shape == SHAPE_FEATURES ? write_features(r, statement, t->srid)
                                                   : write_bytes(r, statement);
-    if (code != SQLITE_DONE && code != SQLITE_ROW) database_failed(t->database, r, code);
+    if (code != SQLITE_DONE && code != SQLITE_ROW) database_failed(t->database, r, code, NULL);
 }
 
 static void answer_mesh(worker *w, request *r, const mesh_kind *kind) {
@@ -155,10 +184,19 @@ static void answer_mesh(worker *w, request *r, const mesh_kind *kind) {
     query q;
     bool by_accept;
     const mesh_format *f = choose_format(r, &by_accept);
+    if (f && f->shape == SHAPE_PICTURE && kind == &VIEW) {
+        answer_problem(r, MHD_HTTP_BAD_REQUEST, "a view has no format \"svg\": a range has");
+        return;
+    }
     if (!f || !terrain_begin(w, r, &t)) return;
     if (query_read(r, &t, &q)) {
         q.format = f->name;
-        if (endpoint_represent(r, t.state, f->type, f->packed, by_accept)) run(r, &t, kind, f, &q);
+        if (endpoint_represent(r, t.state, f->type, f->packed, by_accept)) {
+            if (f->shape == SHAPE_PICTURE)
+                draw(r, &t, &q);
+            else
+                run(r, &t, kind, f, &q);
+        }
         query_free(&q);
     }
     terrain_end(&t);

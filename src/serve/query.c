@@ -8,6 +8,7 @@
 
 #include <ctype.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -126,7 +127,7 @@ static bool make_box(request *r, const terrain *t, const double box[4], query *q
     for (int i = 0; i < 4; i++) sqlite3_bind_double(make, i + 1, box[i]);
     const int code = sqlite3_step(make);
     if (code != SQLITE_ROW) {
-        database_failed(t->database, r, code);
+        database_failed(t->database, r, code, NULL);
         return false;
     }
     const void *bytes = sqlite3_column_blob(make, 0);
@@ -148,6 +149,10 @@ static bool read_region(request *r, const terrain *t, query *q) {
         return false;
     }
     if (!read_box(bbox, box)) return refuse(r, "bbox", "four numbers: x0,y0,x1,y1");
+    snprintf(q->outline, sizeof q->outline,
+             "POLYGON((%.17g %.17g,%.17g %.17g,%.17g %.17g,%.17g %.17g,%.17g %.17g))", box[0], box[1], box[2],
+             box[1], box[2], box[3], box[0], box[3], box[0], box[1]);
+    q->region = q->outline;
     return make_box(r, t, box, q);
 }
 

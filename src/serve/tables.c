@@ -44,7 +44,7 @@ static void answer_with(worker *w, request *r, const char *sql, int (*write)(req
             (statement = database_prepare(t.database, r, sql)) != NULL) {
             query_bind(&q, statement);
             const int code = write(r, statement);
-            if (code != SQLITE_DONE && code != SQLITE_ROW) database_failed(t.database, r, code);
+            if (code != SQLITE_DONE && code != SQLITE_ROW) database_failed(t.database, r, code, NULL);
         }
         query_free(&q);
     }

@@ -94,8 +94,8 @@ int store_query_tables(store *s, const store_terrain *t, store_question *questio
 int store_query_computed(store *s, const store_terrain *t, store_question *question, rqt_patch *patch,
                          store_reads *reads, rqt_code *largest, char **error);
 void store_methods_free(store *s);
-/* A row per answer of a query, as its summary has it. query.c */
-int store_begin_reads(const rqt_query *query, store_reads *reads);
+/* A row per answer of a query, as its summary has it, or its number alone. query.c */
+int store_begin_reads(const rqt_query *query, bool only_numbers, store_reads *reads);
 int64_t store_count_selected(const rqt_query *query, rqt_block_number number, const rqt_block *block);
 
 #define STORE_MINIMAL "_minimal" /* suffix of the tables that hold minimal errors */

@@ -259,7 +259,7 @@ static const rqt_block *make_block(void *context, rqt_block_number number) {
         block = fresh;
     }
     if (!c->reads) return block;
-    if (!c->reads->rows && (c->code = store_begin_reads(c->query, c->reads)) != SQLITE_OK) return NULL;
+    if (!c->reads->rows && (c->code = store_begin_reads(c->query, false, c->reads)) != SQLITE_OK) return NULL;
     while (c->reads->rows[c->next].number != number) c->next = (c->next + 1) % c->reads->count;
     store_read *row = &c->reads->rows[c->next];
     if (!row->needs_bytes)
@@ -334,14 +334,14 @@ int store_query_computed(store *s, const store_terrain *t, store_question *quest
                   .query = &query,
                   .patch = patch,
                   .question = question,
-                  .reads = reads,
+                  .reads = question->options->only_numbers ? NULL : reads,
                   .key = field << 32 | (uint64_t)(t - s->terrains)};
     query.context = &c;
     const rqt_status status = rqt_query_run(&query, store_allocator(), patch);
     code =
         status == RQT_READ_FAILED || status == RQT_INTERRUPTED ? c.code : store_fail_core(error, status, "query");
     if (code == SQLITE_OK && reads && !reads->rows && !question->over && !question->too_large)
-        code = store_begin_reads(&query, reads);
+        code = store_begin_reads(&query, question->options->only_numbers, reads);
     if (code == SQLITE_OK && reads)
         /* NOLINTNEXTLINE(clang-analyzer-core.NullDereference): as many rows as are counted */
         for (size_t i = 0; i < reads->count; i++) reads->rows[i].computed = true;

@@ -139,7 +139,7 @@ typedef struct reading {
     store *store;
     const store_terrain *terrain;
     const rqt_query *query;
-    store_reads *reads; /* may be NULL */
+    store_reads *reads; /* to be told what each read was; NULL: not */
     const rqt_patch *patch;
     store_question *question;
     size_t next;
@@ -172,12 +172,14 @@ static int64_t count_corners(const rqt_query *query, const rqt_answer *answer) {
 }
 
 /* A row per answer, as answered from its index row; the query has sorted them. */
-int store_begin_reads(const rqt_query *query, store_reads *reads) {
+int store_begin_reads(const rqt_query *query, bool only_numbers, store_reads *reads) {
     reads->rows = sqlite3_malloc64((query->answer_count + 1) * sizeof *reads->rows);
     if (!reads->rows) return SQLITE_NOMEM;
     reads->count = query->answer_count;
     for (size_t i = 0; i < reads->count; i++) {
         const rqt_answer *answer = &query->answers[i];
+        reads->rows[i] = (store_read){.number = answer->number};
+        if (only_numbers) continue;
         const bool outside = !rqt_query_needs_block(query, answer) && rqt_query_selects_inside(query, answer);
         reads->rows[i] =
             (store_read){.number = answer->number, .outside = outside, .selected = count_corners(query, answer)};
@@ -193,7 +195,7 @@ static const rqt_block *read_block(void *context, rqt_block_number number) {
     if (r->code != SQLITE_OK) return NULL;
     if (r->reads) {
         /* Blocks come in the order of the answers, once, or twice when a selection is closed first. */
-        if (!r->reads->rows && (r->code = store_begin_reads(r->query, r->reads)) != SQLITE_OK) return NULL;
+        if (!r->reads->rows && (r->code = store_begin_reads(r->query, false, r->reads)) != SQLITE_OK) return NULL;
         while (r->reads->rows[r->next].number != number) r->next = (r->next + 1) % r->reads->count;
         store_read *row = &r->reads->rows[r->next];
         if (!row->needs_bytes) {
@@ -278,7 +280,7 @@ int store_query_tables(store *s, const store_terrain *t, store_question *questio
         reading r = {.store = s,
                      .terrain = t,
                      .query = &query,
-                     .reads = reads,
+                     .reads = options->only_numbers ? NULL : reads,
                      .patch = patch,
                      .question = question,
                      .error = &sentence,
@@ -288,7 +290,7 @@ int store_query_tables(store *s, const store_terrain *t, store_question *questio
         code = status == RQT_READ_FAILED || status == RQT_INTERRUPTED ? r.code
                                                                       : store_fail_core(&sentence, status, "query");
         if (code == SQLITE_OK && reads && !reads->rows && !question->over && !question->too_large)
-            code = store_begin_reads(&query, reads);
+            code = store_begin_reads(&query, options->only_numbers, reads);
     }
     sqlite3_free(list.rows);
     if (code != SQLITE_OK && reads) store_reads_free(reads);

@@ -1,4 +1,5 @@
-/* relief.c - between which heights the samples of a block's cell lie, from what its summary says: no block is read.
+/* relief.c - between which heights the samples of a block's cell lie, and how large errors are in it, from what its
+ * summary says: no block is read.
  *
  * The cell of a block of k > 0 is cut by its main or its other diagonal into two halves, and both have the cell's
  * centre C for their split vertex: they are the diamond of C. So the error of C is at least the distance of any
@@ -14,6 +15,8 @@
  * corner is void: a mixed triangle's plane is not looked at. There, for k = 0, and beneath the finest blocks, a
  * cell lies where the one around it does; the root lies between the extremes of the terrain.
  *
+ * And every vertex of the closed cell but its corners descends from C (core/summary.c): none has an error above e.
+ *
  * Heights are widened by half a quantum, where samples were rounded to them, and by what doubles round away.
  *
  * Summaries are hostile. Whatever they say, a range lies in the one above and is not empty: where the two have
@@ -23,36 +26,41 @@
 #include <math.h>
 
 /* From one height to another, and what the stored ones are off. */
-static void widen(const store_terrain *t, double a, double b, double by, double range[2]) {
+static void set_range(const store_terrain *t, double a, double b, double by, store_relief *relief) {
     const double size =
         fabs((double)t->unit.z0 * rqt_unit_factor(&t->unit)) + fabs(t->unit.offset) + fabs(a) + fabs(b) + by;
     const double slack = by + t->quantum_error + size * 0x1p-48;
-    range[0] = fmin(a, b) - slack;
-    range[1] = fmax(a, b) + slack;
+    relief->lowest = fmin(a, b) - slack;
+    relief->highest = fmax(a, b) + slack;
 }
 
-void store_relief_of_all(const store_terrain *t, double range[2]) {
-    widen(t, rqt_unit_metres(&t->unit, t->min_q), rqt_unit_metres(&t->unit, t->max_q), 0, range);
+store_relief store_relief_of_all(const store_terrain *t) {
+    store_relief all = {.error = t->max_error};
+    set_range(t, rqt_unit_metres(&t->unit, t->min_q), rqt_unit_metres(&t->unit, t->max_q), 0, &all);
+    return all;
 }
 
-int store_relief(store *s, const store_terrain *t, rqt_block_number number, double range[2], char **error) {
+int store_find_relief(store *s, const store_terrain *t, rqt_block_number number, store_relief *relief,
+                      char **error) {
     if (t->k == 0 || t->lattice.width == 1 || t->lattice.height == 1) return SQLITE_OK;
     const rqt_summary *summary;
     const int code = store_get_summary(s, t, number, &summary, error);
     if (code != SQLITE_OK) return code;
-    double low = INFINITY, high = -INFINITY, own[2];
+    if (summary->center_error < relief->error) relief->error = summary->center_error;
+    double low = INFINITY, high = -INFINITY;
     for (int c = 0; c < 4; c++) {
         if (!(summary->corner[c].flags & RQT_VALID)) return SQLITE_OK;
         const double z = rqt_unit_metres(&t->unit, summary->corner[c].q);
         low = fmin(low, z);
         high = fmax(high, z);
     }
-    widen(t, low, high, rqt_code_metres(summary->center_error), own);
-    if (own[0] > range[1] || own[1] < range[0])
+    store_relief own;
+    set_range(t, low, high, rqt_code_metres(summary->center_error), &own);
+    if (own.lowest > relief->highest || own.highest < relief->lowest)
         return store_fail(error, SQLITE_CORRUPT_VTAB,
                           "terrain %s is damaged: the heights of block %llu are not within those around it",
                           t->name, (sqlite3_uint64)number);
-    range[0] = fmax(range[0], own[0]);
-    range[1] = fmin(range[1], own[1]);
+    relief->lowest = fmax(relief->lowest, own.lowest);
+    relief->highest = fmin(relief->highest, own.highest);
     return SQLITE_OK;
 }

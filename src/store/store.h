@@ -84,6 +84,7 @@ typedef struct store_query_options {
      * added: exact, local, wedgie, euclid; minimal is SQLITE_ERROR. */
     rqt_rule *rule;
     bool wants_leaves; /* fill patch->leaves; with RQT_PRODUCT_TRIANGLES only */
+    bool only_numbers; /* of reads: number alone, the rest 0. To say what each was takes as long as the query */
 } store_query_options;
 
 /* One row per block that answered, in Morton order. */
@@ -137,12 +138,18 @@ int store_normals(store *s, const store_terrain *t, const rqt_patch *patch, floa
 int store_height(store *s, const store_terrain *t, double x, double y, double eps, double *metres, bool *found,
                  char **error);
 
-/* Between which heights the samples are, metres, from what is known without reading a block (relief.c has the
- * proof): of the whole terrain; and of a block's cell, for which range comes with that of the cell around it (or of
- * all) and is narrowed. Between store_begin and store_end. SQLITE_CORRUPT_VTAB when the two have nothing in common.
- */
-void store_relief_of_all(const store_terrain *t, double range[2]);
-int store_relief(store *s, const store_terrain *t, rqt_block_number number, double range[2], char **error);
+/* What is known of the samples of a square without reading a block; relief.c has the proof. */
+typedef struct store_relief {
+    double lowest,
+        highest;    /* metres: no valid sample is beyond; of heights as they were before they were rounded */
+    rqt_code error; /* no vertex but the square's corners has a larger one */
+} store_relief;
+/* Of the whole terrain. */
+store_relief store_relief_of_all(const store_terrain *t);
+/* Of a block's cell: *relief is that of the cell around it (or of all), and is narrowed. Between store_begin and
+ * store_end. SQLITE_CORRUPT_VTAB when the two have no height in common. */
+int store_find_relief(store *s, const store_terrain *t, rqt_block_number number, store_relief *relief,
+                      char **error);
 
 /* How far check has come, and what it found: severity (so far always "error"), block 0 when it is not about one. */
 typedef struct store_finding {

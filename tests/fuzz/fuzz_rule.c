@@ -1,9 +1,9 @@
-/* fuzz_rule.c - rules: an eps of its own for places, eps lowered by rank, forced vertices and borders; and what
- * becomes of a patch: clipped, and as heights along lines. Whichever way vertices are selected the mesh is one;
- * what a rule says of a vertex is what it says of its parts. */
+/* fuzz_rule.c - rules: an eps of its own for places and for the squares of a field, eps lowered by rank, forced
+ * vertices and borders; and what becomes of a patch: clipped, and as heights along lines. Whichever way vertices
+ * are selected the mesh is one; what a rule says of a vertex is what it says of its parts. */
 #include "fuzz_terrain.h"
 
-enum { PLACES = 4, POINTS = 12 };
+enum { PLACES = 4, POINTS = 12, SQUARES = 400 };
 
 typedef struct ruling {
     rqt_rule *rule;
@@ -11,6 +11,7 @@ typedef struct ruling {
     rqt_rule_place places[PLACES];
     size_t count;
     double eps;
+    rqt_field *field;
 } ruling;
 
 static bool at_once(void *context) {
@@ -24,6 +25,7 @@ static double take_tolerance(input *in) {
 
 static void drop(ruling *r) {
     rqt_rule_free(r->rule);
+    rqt_field_free(r->field);
     for (size_t i = 0; i < PLACES; i++) rqt_region_free(r->regions[i]);
 }
 
@@ -39,6 +41,70 @@ static void refuse(input *in, ruling *r, const rqt_lattice *l) {
          "a vertex outside the lattice");
 }
 
+/* ------------------------------------------------------------------------------------------------ fields */
+typedef struct deciding {
+    input *in;
+    const rqt_lattice *lattice;
+    int asked;
+    bool wrong; /* an answer that is none has been given */
+} deciding;
+
+static rqt_field_step decide(void *context, rqt_square s, double *eps) {
+    deciding *d = context;
+    HOLD(s.side >= 1 && (s.side & (s.side - 1)) == 0 && s.x % s.side == 0 && s.y % s.side == 0 && s.x >= 0 &&
+             s.y >= 0 && (s.x == 0 || s.x < d->lattice->width - 1) && (s.y == 0 || s.y < d->lattice->height - 1),
+         "(%d,%d), side %d, is no square of the raster", s.x, s.y, s.side);
+    HOLD(!d->wrong, "asked after a wrong answer");
+    if (d->asked++ < SQUARES && take_between(d->in, 0, 2) > 0) {
+        d->wrong = s.side == 1;
+        if (!d->wrong || take_between(d->in, 0, 30) == 0) return RQT_FIELD_SPLIT;
+        d->wrong = false;
+    }
+    *eps = take_between(d->in, 0, 6) ? take_tolerance(d->in) : INFINITY;
+    d->wrong = isnan(*eps);
+    return RQT_FIELD_LEAF;
+}
+
+/* Squares tile what there is, in Morton order; the least of a box is that of its squares, one by one. */
+static void look_at_field(input *in, const rqt_field *f, const rqt_lattice *l) {
+    const int32_t most = (1 << l->K) + 2, x0 = take_between(in, -3, most), y0 = take_between(in, -3, most),
+                  x1 = x0 + take_between(in, 0, most), y1 = y0 + take_between(in, 0, most);
+    double least = INFINITY, eps = 0;
+    int64_t covered = 0;
+    rqt_square s;
+    const size_t count = rqt_field_count(f);
+    for (size_t n = 0; n < count; n++) {
+        HOLD(rqt_field_square(f, n, &s, &eps) && eps >= 0, "square %zu of %zu", n, count);
+        const rqt_vertex end = rqt_vertex_clamp(l, (rqt_vertex){s.x + s.side, s.y + s.side});
+        covered += (int64_t)(end.x - s.x) * (end.y - s.y);
+        if (x0 < x1 && y0 < y1 && s.x < x1 && s.x + s.side > x0 && s.y < y1 && s.y + s.side > y0)
+            least = fmin(least, eps);
+    }
+    HOLD(!rqt_field_square(f, count, &s, &eps), "there is no square %zu", count);
+    HOLD(covered == (int64_t)(l->width - 1) * (l->height - 1), "squares cover %lld samples", (long long)covered);
+    HOLD(rqt_field_least(f, x0, y0, x1, y1) == least, "the least is %g, not %g", rqt_field_least(f, x0, y0, x1, y1),
+         least);
+}
+
+static bool give_field(input *in, ruling *r, const rqt_lattice *l, const rqt_allocator *a, fuzz_heap *h) {
+    deciding d = {in, l, 0, false};
+    const rqt_status status = rqt_field_create(l, a, decide, &d, &r->field);
+    if (d.wrong) {
+        HOLD((status == RQT_INVALID || status == RQT_NO_MEMORY) && !r->field, "status %d", (int)status);
+        return true;
+    }
+    if (!went_well(status, h)) return false;
+    if (take_between(in, 0, 1)) {
+        const double factor = take_double(in);
+        HOLD(rqt_field_scale(r->field, factor) == (factor > 0 && isfinite(factor) ? RQT_OK : RQT_INVALID), "%g",
+             factor);
+    }
+    look_at_field(in, r->field, l);
+    HOLD(rqt_rule_set_field(r->rule, r->field) == RQT_OK, "field");
+    return true;
+}
+
+/* ------------------------------------------------------------------------------------------------- rules */
 static bool make_rule(input *in, const fuzz_terrain *t, const rqt_region *region, const rqt_allocator *a,
                       fuzz_heap *h, ruling *r) {
     const rqt_lattice *l = &t->grid.lattice;
@@ -62,6 +128,7 @@ static bool make_rule(input *in, const fuzz_terrain *t, const rqt_region *region
         r->places[r->count++] = (rqt_rule_place){place, eps};
     }
     if (!went_well(rqt_rule_set_places(r->rule, r->places, r->count), h)) return false;
+    if (take_between(in, 0, 1) && !give_field(in, r, l, a, h)) return false;
     if (take_between(in, 0, 3) == 0) refuse(in, r, l);
     for (int n = take_between(in, 0, 3); n > 0; n--) {
         const rqt_vertex v = {take_between(in, 0, 1 << l->K), take_between(in, 0, 1 << l->K)};

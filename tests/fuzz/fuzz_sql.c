@@ -16,6 +16,17 @@ static void take_argument(input *in, const char *name, size_t n, char *text, siz
           "rqt_bbox(-71.4, 44.2, -71.3, 44.3)", "'POLYGON((1.5 -2.5, 14 -3, 9 -19.25, 1.5 -2.5))'",
           "'LINESTRING(2 -2, 9 -9)'", "'POINT(-71.3 44.3)'", "rqt_circle(-71.3, 44.3, 2000)",
           "'MULTIPOLYGON(((1 -1,9 -1,9 -9,1 -1),(2 -2,4 -2,4 -3,2 -2)))'"}},
+        {"camera",
+         {"'{\"eye\":[-71.4,44.2,3000],\"yaw\":30,\"pitch\":-20,\"fovy\":60,\"width\":64,\"height\":48,\"tau\":4}'",
+          "'{\"eye\":[5,-5,90],\"at\":[9,-9,0],\"fovy\":60,\"width\":64,\"height\":48,\"roll\":-7,\"near\":1}'",
+          "'{\"eye\":[5,-5,1],\"at\":[5,-5,-1e9],\"fovy\":170,\"width\":1,\"height\":9,\"exaggeration\":3}'",
+          "'{\"eye\":[-71.3,44.3,1e9],\"yaw\":0,\"pitch\":-90,\"fovy\":0.01,\"width\":9,\"height\":9,\"tau\":0.1}'",
+          "'{\"eye\":[1,2,3],\"at\":[1,2,3],\"fovy\":60,\"width\":64,\"height\":48}'",
+          "'{\"eye\":[1e15,-1e15,1e15],\"at\":[0,0,0],\"fovy\":60,\"width\":1e15,\"height\":1,\"far\":2}'",
+          "'{\"eye\":[1500000,-4300000,4400000],\"at\":[0,0,0],\"position\":\"ecef\",\"fovy\":1,\"width\":64,"
+          "\"height\":48}'",
+          "'{\"eye\":[-71.3,44.3,5000],\"yaw\":0,\"pitch\":-89,\"position\":\"lonlat\",\"fovy\":45,\"width\":640,"
+          "\"height\":480,\"tau\":3}'"}},
         {"line",
          {"'LINESTRING(2 -2, 9 -9)'", "'LINESTRING(-71.4 44.2, -71.25 44.3, -71.3 44.4)'", "NULL", "'POINT(3 -3)'",
           "'MULTILINESTRING((1 -1, 3 -3), (4 -4, 9 -2))'", "'LINESTRING EMPTY'", "'LINESTRING(3 -3, 3 -3)'",

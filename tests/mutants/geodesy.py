@@ -34,7 +34,7 @@ MUTANTS = [
      SQL, "areas: the Earth at height 0"),
     ("geodesy: a row beyond the pole by a rounding has no place", "ext/frame.c", "lonlath[1] = copysign(90, lonlath[1]);",
      "lonlath[1] += 0;", SQL, "F28 a row beyond the pole by a rounding is the pole"),
-    ("geodesy: frames take any metric", "ext/detail.c", 'border && r->frame_kind == FRAME_CRS) return SQLITE_OK;',
+    ("geodesy: frames take any metric", "ext/detail.c", 'border && r->frame_kind == FRAME_CRS && !r->view) return SQLITE_OK;',
      'border) { return rqt_rule_create(&r->terrain->lattice, r->terrain->quantum_error, store_allocator(), &r->options.rule) '
      '== RQT_OK ? SQLITE_OK : SQLITE_NOMEM; }', SQL, "frames: not with"),
     ("area: frames are taken and left", "ext/area.c", "if (r.frame)", "if (false)", SQL, "areas: frames are refused"),

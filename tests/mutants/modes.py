@@ -16,7 +16,7 @@ MUTANTS = [
      "if (code < least && region_touches(rule->places[i].region, &reach)) return code;",
      "test_core_rule", DEFINITION),
     ("rules: a place may make the mesh coarser", "src/core/rule.c",
-     "    int32_t least = rule->base[rank];\n", "    int32_t least = rule->place_count ? RQT_CODE_LARGEST : rule->base[rank];\n",
+     "    int32_t least = threshold_without_places(rule, v, rank);\n", "    int32_t least = rule->place_count ? RQT_CODE_LARGEST : rule->base[rank];\n",
      "test_core_rule", DEFINITION),
     ("rules: what touches a box does not meet it", "src/core/region.c",
      "        if (region_box_is_touched(box, &region->border.items[polygon->first + i])) return true;\n    const region_point any",

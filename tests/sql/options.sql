@@ -106,7 +106,7 @@ SELECT * FROM rqt_triangles(NULL, 1, NULL, '{"max_triangles":100}');
 SELECT * FROM rqt_range(NULL, 1, NULL, '{"previous":"x"}');
 --! rqt_range(): option "previous" is not in this version
 SELECT * FROM rqt_verify(NULL, 1, NULL, '{"test":{}}');
---! rqt_verify(): option "test" is not in this version
+--! rqt_verify(): option "test" must be a text: one of guaranteed ulrich node sphere lindstrom lodmap
 
 -- unknown keys and values
 SELECT rqt_mesh(NULL, 1, 'obj', NULL, '{"modus":"cover"}');
