@@ -182,7 +182,7 @@ test-serve: ## the query service's tests, plain and under ASan and UBSan
 	@$(MAKE) --no-print-directory -j2 BUILD=$(BUILD)/sanitized OPTIMIZE=-O1 \
 	  SANITIZE="-fsanitize=address,undefined -fno-sanitize-recover=undefined" $(BUILD)/sanitized/rqt
 	@RQT=$(CURDIR)/$(BUILD)/rqt RQT_SO=$(CURDIR)/$(BUILD)/rqt.so ./tests/test_serve.sh | grep -v '^ok'
-	@ASAN_OPTIONS=detect_leaks=1 RQT_HOSTILE_MIB=1024 RQT=$(CURDIR)/$(BUILD)/sanitized/rqt RQT_SO=$(CURDIR)/$(BUILD)/rqt.so ./tests/test_serve.sh | grep -v '^ok'
+	@ASAN_OPTIONS=detect_leaks=1 LSAN_OPTIONS=suppressions=$(CURDIR)/tests/leaks.supp:print_suppressions=0 RQT_HOSTILE_MIB=1024 RQT=$(CURDIR)/$(BUILD)/sanitized/rqt RQT_SO=$(CURDIR)/$(BUILD)/rqt.so ./tests/test_serve.sh | grep -v '^ok'
 
 # clang's libFuzzer steers by what code an input reaches; what it finds stays in build/fuzz/NAME.
 SECONDS ?= 60

@@ -330,6 +330,8 @@ for path, status, sentence in (
         ("/collections/%zz", 400, "the path holds a %"),
         ("/collections/a%00b", 400, "the path holds a NUL"),
         (HILLS + "?a=1&" + "&".join("b%d=1" % i for i in range(40)), 400, "more than 32 parameters"),
+        ("http://elsewhere.example", 400, "the path is missing"),
+        ("http://elsewhere.example?f=json", 400, "does not begin with /"),
         ("/?f=pdf", 400, "json or html"),
         ("/" + "a" * 33000, 414, "longer than 32768 bytes")):
     answer = ask(path)

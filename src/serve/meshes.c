@@ -55,11 +55,10 @@ static const mesh_kind VIEW = {
     "SELECT rqt_view_mesh(:camera, :format, :terrain, :options)"};
 
 static const mesh_format *by_name(request *r, const char *name) {
-    buffer known = {.most = 256};
-    for (int i = 0; i < FORMAT_COUNT; i++) {
+    for (int i = 0; i < FORMAT_COUNT; i++)
         if (strcmp(FORMATS[i].name, name) == 0) return &FORMATS[i];
-        buffer_format(&known, " %s", FORMATS[i].name);
-    }
+    buffer known = {.most = 256};
+    for (int i = 0; i < FORMAT_COUNT; i++) buffer_format(&known, " %s", FORMATS[i].name);
     answer_problem(r, MHD_HTTP_BAD_REQUEST, "there is no format \"%s\"; there are%.*s", name, (int)known.size,
                    known.bytes ? known.bytes : "");
     buffer_free(&known);

@@ -124,7 +124,7 @@ bool target_read(request *r) {
     }
     if (strncmp(p, "http://", 7) == 0) { /* as proxies write it */
         p = strpbrk(p + 7, "/?");
-        if (!p) p = "/";
+        if (!p) return refuse(r, "path", "is missing");
     }
     if (*p != '/') return refuse(r, "path", "does not begin with /");
     const char *end = r->target + length, *question = strchr(p, '?');
