@@ -1,6 +1,7 @@
 /* scene.c - the scene of a terrain, and the pieces of it that hold its squares.
  *
- * *Planar* (projected, or no CRS): a square is a box; its prism the cylinder around it.
+ * *Planar* (projected, or no CRS): a square is a box; its prism the cylinder around it. A mesh differs from a
+ * sample along the axis.
  *
  * *Geocentric* (degrees): on the ellipsoid of the terrain's CRS. Heights are taken as above it, unless the answer
  * is to be in space too (option frame) and they are above a geoid: then the scene is where the answer is. Let E be
@@ -20,6 +21,9 @@
  * further than R G + H u. The prism about E(c) + ((lo + hi - R v)/2) n(c) therefore has
  *
  *     half_height = (hi - lo)/2 + R v/2 + H v,      radius = R G + H u.
+ *
+ * A mesh differs from a sample along n and, for its triangles are flat, in any direction: nothing is said of it
+ * (upright 0).
  *
  * The box. Along east at c, p is (N + h) cos(lat) sin(dlon) away, at most (R + H) C b. Along north: from c to the
  * same longitude R a and H a at most, and from there (N + h) cos(lat) (1 - cos dlon) times a sine: (R + H) C b^2/2.
@@ -117,6 +121,7 @@ static void planar_piece(const scene *s, const double low[3], const double high[
     piece->half_north = (high[1] - low[1]) / 2 * s->metre + slack;
     prism->radius = sqrt(piece->half_east * piece->half_east + piece->half_north * piece->half_north) + slack;
     prism->half_height = (high[2] - low[2]) / 2 * s->exaggeration + slack;
+    prism->upright = 1;
 }
 
 static void geocentric_piece(const scene *s, const double low[3], const double high[3], rqt_view_piece *piece) {
@@ -136,6 +141,7 @@ static void geocentric_piece(const scene *s, const double low[3], const double h
     const double slack = rounding(polar + most);
     prism->radius = polar * angle + most * u + slack;
     prism->half_height = (hi - lo) / 2 + polar * v / 2 + most * v + slack;
+    prism->upright = 0;
     piece->half_east = fmin((polar + most) * cosine * fmin(b, 1) + slack, prism->radius);
     piece->half_north = fmin((polar + most) * (a + cosine * b * b / 2) + slack, prism->radius);
 }

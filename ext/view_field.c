@@ -1,12 +1,13 @@
 /* view_field.c - what a camera allows each square of a terrain: the field, and what of the ground may be seen.
  *
- * From the root down, a square's heights come from the summaries of the store (store_relief), as far as there are
- * blocks of its size, and from the square around it below. Its prism and the test give its eps. A square is cut
- * into quarters while that pays: while what it costs as a whole (eps at its worst point, used for all of it) is
- * well below what its parts would be allowed, or while it is neither wholly in the picture nor wholly outside.
+ * From the root down, a square's heights come from the summaries of the store, as far as there are blocks of its
+ * size, and from the square around it below. Its piece of the scene and the test give its eps: for all of it, that
+ * of its worst point. It is cut into quarters while that pays: not where its parts would be allowed little more,
+ * nor where there is little to select at such an eps, nor where everything is selected anyway.
  *
- * The squares that may be seen are the region of the query: rings of one polygon in samples, the sides of
- * neighbours cancel (region_snap.c does the same). What is elsewhere cannot be drawn. */
+ * The squares that may be seen, grown a little so that their rim is simple, are the region of the query: rings of
+ * one polygon in samples, the sides of neighbours cancel (region_snap.c does the same). What is elsewhere cannot be
+ * drawn. */
 #include "view.h"
 
 #include <math.h>
@@ -15,6 +16,10 @@
 /* Vertices: with half of one, meshes have about 5 % more of them than with squares as small as can be, for four to
  * ten thousand squares. */
 #define WORTH_CUTTING 1.0
+
+/* What may be seen grows to squares of a side of at least half a 32nd of their distance: 2 % more vertices, but a
+ * rim of half as many pieces, and the walk asks it at every step along it. */
+#define RIM_STEPS 32
 
 #define ASKED_AT_A_TIME 16384 /* squares between two questions whether to go on: a few milliseconds */
 
@@ -36,7 +41,24 @@ typedef struct builder {
 
 /* --------------------------------------------------------------------------------------------- what is seen -- */
 
+static bool is_in(rqt_square inner, rqt_square outer) {
+    return inner.x >= outer.x && inner.y >= outer.y && inner.x < outer.x + outer.side &&
+           inner.y < outer.y + outer.side;
+}
+
+/* As large as the detail of the region's rim is to be, at its distance. */
+static rqt_square grow_square(rqt_square square, const rqt_view_piece *piece, double distance,
+                              const rqt_lattice *lattice) {
+    const double cell = 2 * piece->half_east / piece->side;
+    while (2 * square.side * cell * RIM_STEPS < distance && 2 * square.side <= 1 << lattice->K) square.side *= 2;
+    square.x &= -square.side;
+    square.y &= -square.side;
+    return square;
+}
+
 static bool add_square(square_list *list, rqt_square square) {
+    if (list->count > 0 && is_in(square, list->items[list->count - 1])) return true;
+    while (list->count > 0 && is_in(list->items[list->count - 1], square)) list->count--;
     if (list->count == list->capacity) {
         const size_t more = list->capacity ? 2 * list->capacity : 256;
         rqt_square *items = sqlite3_realloc64(list->items, more * sizeof *items);
@@ -147,7 +169,8 @@ static rqt_field_step decide(void *context, rqt_square square, double *eps) {
     rqt_view_test_bound(v->test, &v->camera, &piece, &bound);
     if (square.side > 1 && worth_of(b, square, level, &bound) > WORTH_CUTTING) return RQT_FIELD_SPLIT;
     *eps = bound.eps / v->scene.exaggeration;
-    if (!bound.shown || add_square(&b->shown, square)) return RQT_FIELD_LEAF;
+    if (!bound.shown || add_square(&b->shown, grow_square(square, &piece, bound.distance, lattice)))
+        return RQT_FIELD_LEAF;
     b->code = SQLITE_NOMEM;
     return RQT_FIELD_FAIL;
 }

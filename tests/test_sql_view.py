@@ -246,6 +246,7 @@ for title, given in (
         ("F31 eye at infinity", dict(eye=place("alps", 0.5, 0.5, 1e9), yaw=0, pitch=-90, fovy=0.01, tau=0.01)),
         ("F32 field of view of 0.01 degrees", dict(eye=place("alps", 0, 1, 1e6), at=place("alps", 0.5, 0.5, 1500), fovy=0.01, tau=2)),
         ("F32 field of view of 170 degrees", dict(eye=place("alps", 0.3, 0.6, 3000), yaw=60, pitch=-40, fovy=170, tau=2)),
+        ("turned by 35 degrees in its picture", dict(eye=place("alps", 0.5, 0.9, 4500), yaw=10, pitch=-40, roll=35, width=150, height=600, tau=4)),
         ("F33 straight down", dict(eye=place("alps", 0.5, 0.5, 5000), yaw=77, pitch=-90, tau=3)),
         ("F33 at what is straight below", dict(eye=place("alps", 0.5, 0.5, 5000), at=place("alps", 0.5, 0.5, 0), tau=3))):
     most, drawn, missed = worst(camera(**given), "alps", each=2)

@@ -18,8 +18,8 @@
  * does a closed square of the field that holds one, and has a point in common with the inside: the sample itself.
  * Every sample is in a square that exists (field.c). So dev(T) <= e_sat(P) <= eps - lowering for the least of those
  * places and squares, and for the rule's own eps. A leaf without a split vertex holds no samples but its corners.
- * Why the sides of squares do not count, as those of places do: squares tile. A box that is a union of squares would
- * meet all those around it, which hold no sample of T that its own do not.
+ * Why the sides of squares do not count, as those of places do: squares tile. A box that is a union of squares
+ * would meet all those around it, which hold no sample of T that its own do not.
  *
  * Blocks. Every vertex of the closed cell of a block, except its corners, descends from the cell's centre C
  * (summary.c). So their thresholds are not below threshold(C), and one of them is a forced vertex or an ancestor of

@@ -103,6 +103,7 @@ if [[ -e $BUILD/librqt.a ]]; then
     }
     core bench_errors ""
     core bench_walk ""
+    core bench_field ""
     echo
     echo "Exact errors and saturation, one core (aim: 60 Msamples/s, the same bytes)"
     "$OUT/bench_errors" "$raster" "$side" "$RUNS"
@@ -110,6 +111,9 @@ if [[ -e $BUILD/librqt.a ]]; then
     echo "The walk over decoded blocks in memory, one thread, beside RTIN's recursion in C over the same errors"
     echo "(aim: 120 Mtriangles/s, 1.5 times RTIN in C)"
     "$OUT/bench_walk" "$K" "$raster" | tee "$OUT/walk.txt"
+    echo
+    echo "What a field of an eye over the middle costs a query (aim: 20 us a block of 65 a side over one eps)"
+    "$OUT/bench_field" "$K" "$raster"
     if [[ -d $BUILD/peers/node_modules/@mapbox/martini ]] && command -v node >/dev/null; then
         echo
         echo "Beside @mapbox/martini's getMesh on the same $side x $side samples (aim: 6 times)"

@@ -44,7 +44,7 @@ MUTANTS = [
      "    return !rqt_rule_selects(rule, (rqt_vertex){x + side / 2 - 1, y + side / 2 - 1}, em, false);\n",
      "test_core_rule", "F19_four_eps_at_a_block_corner_meet_without_t_junctions"),
     ("rules: a block without selected errors answers though a vertex in it is forced", "src/core/rule.c",
-     "    if (is_forced(rule, v)) return true;\n    const region_box reach", "    const region_box reach",
+     "    if (is_forced(rule, v)) return true;\n    if (error >", "    if (error >",
      "test_core_rule", DEFINITION),
     ("rules: a block is chosen from as by one eps", "src/core/walk.c",
      "if (c.range.least == c.range.most && c.range.least >= 0 && !c.range.forced)", "if (c.range.least >= 0 && !c.range.forced)",
