@@ -26,7 +26,7 @@ BOX = "-71.32,44.25,-71.28,44.29"
 WKT = "POLYGON((-71.4 44.2, -71.2 44.2, -71.3 44.3, -71.4 44.2))"
 CAMERA = json.dumps({"eye": [-71.5, 44.1, 2500], "at": [-71.3033, 44.2705, 1500], "fovy": 45, "width": 640, "height": 480, "tau": 3})
 HILLS = "/collections/hills"
-service = Service(DB)
+service = Service(DB, "--max-seconds", "1000")
 ask = service.ask
 s.check("the service says where it listens, on this machine alone", re.fullmatch(r"http://127\.0\.0\.1:\d+/", service.url), service.url)
 
