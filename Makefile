@@ -211,6 +211,12 @@ verify-data: ## rqt_verify over every DEM of DATA=dir at nine eps
 	@$(MAKE) --no-print-directory -j2 products
 	@BUILD=$(BUILD) ./tests/bench/verify_data.sh $(DATA)
 
+.PHONY: verify-views
+verify-views: ## rqt_view_verify over 200 cameras on every DEM of DATA=dir, and every test of options.test: tables
+	@./src/install-packages.sh build test
+	@$(MAKE) --no-print-directory -j2 products
+	@RQT=$(BUILD)/rqt RQT_SO=$(BUILD)/rqt.so /usr/bin/python3 tests/bench/verify_views.py $(DATA)
+
 .PHONY: check-layers
 check-layers: ## modules depend one way only; librqt.a and rqt.so mention only what they may
 	@./src/install-packages.sh build test
@@ -243,7 +249,7 @@ check-docs: ## fail when ext/SQL.md, the README's session or the list of fuzzers
 	@./tests/check_fuzz.sh
 
 # ---------------------------------------------------------------------------------------------------- benches
-.PHONY: bench bench-data bench-update bench-table1 bench-serve chart peers
+.PHONY: bench bench-data bench-update bench-table1 bench-serve bench-views chart chart-views peers
 bench: ## speed and size beside GDAL's, medians of five and more
 	@./src/install-packages.sh build test
 	@$(MAKE) --no-print-directory -j2 products
@@ -266,6 +272,11 @@ bench-serve: ## the query service under wrk, beside nginx that sends the same by
 	@./src/install-packages.sh build bench
 	@$(MAKE) --no-print-directory -j2 products
 	@BUILD=$(BUILD) ./tests/bench/bench_serve.sh
+bench-views: ## what views cost: one megapixel, fly-overs, ETOPO5 over a network, beside the papers' figures
+	@./src/install-packages.sh build test
+	@./src/install-packages.sh views || echo "No ETOPO5: the table goes without" >&2
+	@$(MAKE) --no-print-directory -j2 products
+	@BUILD=$(BUILD) ./tests/bench/bench_views.sh
 
 # What published methods give on the catalogue's inputs (tests/catalogue.txt), beside rqt.
 .PHONY: stability check-stability
@@ -291,6 +302,10 @@ chart: ## speed against accuracy, drawn: pictures in build/chart; peers from npm
 	@./src/install-packages.sh peers || echo "No node: the charts go without peers" >&2
 	@$(MAKE) --no-print-directory -j2 products
 	@BUILD=$(BUILD) DATA="$(if $(filter command% environment%,$(origin DATA)),$(DATA))" DOCS=$(DOCS) ./tests/bench/chart.sh
+chart-views: ## views by the guaranteed test beside those of the literature, drawn: pictures in build/chart; DATA=dir
+	@./src/install-packages.sh build test
+	@$(MAKE) --no-print-directory -j2 products
+	@BUILD=$(BUILD) DATA="$(if $(filter command% environment%,$(origin DATA)),$(DATA))" DOCS=$(DOCS) ./tests/bench/chart_views.sh
 peers: ## vertices at equal true error beside a greedy TIN and RTIN, for six DEMs of DATA=dir
 	@./src/install-packages.sh build test
 	@./src/install-packages.sh peers || echo "No node: the table goes without peers" >&2

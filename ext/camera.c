@@ -138,7 +138,6 @@ int camera_read(sqlite3_value *json, camera_words *words, char **error) {
 
 /* Longitude and latitude as x and y of the terrain. */
 static int from_lonlat(connection *c, const store_terrain *t, double place[3], const char *what, char **error) {
-    if (fabs(place[1]) > 90) return fail(error, "camera: \"%s\": there is no latitude %!.15g", what, place[1]);
     char *text = sqlite3_mprintf("SRID=4326;POINT(%!.17g %!.17g)", place[0], place[1]);
     if (!text) return SQLITE_NOMEM;
     char name[24];
@@ -156,14 +155,18 @@ static int from_lonlat(connection *c, const store_terrain *t, double place[3], c
     return code;
 }
 
-/* The place in the terrain's coordinates. */
+/* The place in the terrain's coordinates. Geocentric places are those of the terrain's own datum, if it is in
+ * degrees.
+ */
 static int to_terrain(connection *c, const scene *s, camera_position position, double place[3], const char *what,
                       char **error) {
-    if (position == CAMERA_ECEF) {
-        const int code = scene_from_geocentric(s, place, what, error);
-        if (code != SQLITE_OK) return code;
-    }
-    return position == CAMERA_CRS || s->space ? SQLITE_OK : from_lonlat(c, s->terrain, place, what, error);
+    int code = SQLITE_OK;
+    if (position == CAMERA_ECEF) code = scene_from_geocentric(s, place, what, error);
+    if (code != SQLITE_OK) return code;
+    if ((s->space || position != CAMERA_CRS) && fabs(place[1]) > 90)
+        return fail(error, "camera: \"%s\": there is no latitude %!.15g", what, place[1]);
+    const bool is_there = position == CAMERA_CRS || (s->space && (s->terrain->wgs84 || position == CAMERA_ECEF));
+    return is_there ? SQLITE_OK : from_lonlat(c, s->terrain, place, what, error);
 }
 
 /* ------------------------------------------------------------------------------------------------ camera -- */

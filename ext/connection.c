@@ -12,7 +12,8 @@
 struct connection {
     sqlite3 *db;
     store *store;
-    places *kept; /* NULL: none */
+    places *kept;       /* NULL: none */
+    known_views *views; /* NULL: none */
     int holders;
     bool owned; /* rqt_terrains is connected */
     bool busy;  /* a call of ours is under way */
@@ -33,6 +34,10 @@ places **connection_places(connection *c) {
     return &c->kept;
 }
 
+known_views **connection_views(connection *c) {
+    return &c->views;
+}
+
 void connection_hold(connection *c) {
     c->holders++;
 }
@@ -41,6 +46,7 @@ void connection_release(void *p) {
     connection *c = p;
     if (--c->holders > 0) return;
     places_release(c->kept);
+    known_views_free(c->views);
     store_close(c->store);
     sqlite3_free(c);
 }

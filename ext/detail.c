@@ -385,5 +385,6 @@ double rule_least_eps(const request *r) {
 void rule_free(request *r) {
     rqt_rule_free(r->options.rule);
     places_release(r->places);
-    cJSON_Delete(r->detail);
+    r->options.rule = NULL;
+    r->places = NULL;
 }

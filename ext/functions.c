@@ -123,6 +123,21 @@ const function rqt_functions[] = {
      .example = "SELECT max_error <= 10, t_junctions, overlaps, uncovered FROM rqt_verify(" SUMMIT ", 10)",
      .fill = fill_verify,
      .hidden = "void_touched, twice_area_in_cells, half_cells, achieved_eps"},
+    {.name = "rqt_view_verify",
+     .arguments = "camera [, terrain [, options]]",
+     .returns = "samples, drawn, vertices, triangles, max_pixels, rms_pixels, x, y, z, t_junctions, overlaps",
+     .purpose =
+         "Proves the mesh of a view: projects every full-resolution sample of the terrain and the mesh's place "
+         "that "
+         "belongs to it. max_pixels: the largest distance of the two in the picture where one of them is drawn, at "
+         "x, y, z; infinite where the other is behind the eye. uncovered: samples that are drawn, in no triangle, "
+         "and further from voids than what achieved_tau pixels are there.",
+     .example =
+         "SELECT max_pixels <= 1, t_junctions, overlaps, uncovered, guaranteed FROM rqt_view_verify("
+         "'{\"eye\": [-71.33, 44.22, 2500], \"at\": [-71.3033, 44.2705, 1900], \"fovy\": 40, \"width\": 1280, "
+         "\"height\": 800}')",
+     .fill = fill_view_verify,
+     .hidden = "achieved_tau, guaranteed, uncovered"},
     {.name = "rqt_explain",
      .arguments = MESH,
      .returns = "level, extent, why, bytes, cached, selected",
@@ -140,10 +155,19 @@ const function rqt_functions[] = {
          "[x,y,z], or yaw (degrees clockwise from north) and pitch (degrees upward); roll (0); fovy (degrees); "
          "width, height and tau (1): pixels; near (0) and far in metres; exaggeration (1) of the ground's heights; "
          "position of eye and at: crs, lonlat or ecef. No sample that is drawn is more than tau pixels from its "
-         "place in the mesh. Terrains in degrees are in space. Outlines of voids are tol unless options say exact.",
+         "place in the mesh, and guaranteed is 1 if that holds for the source's heights, too, where they were "
+         "rounded, and for the test that options name. Terrains in degrees are in space; terrain hides nothing, "
+         "not even the Earth what is behind it: give far. Outlines of voids are tol "
+         "unless options say exact. "
+         "max_triangles: the smallest achieved_tau >= tau that takes no more. previous: \"\" or the token of the "
+         "last "
+         "answer, which stays while the camera moves little. To move vertices without a jump: z_from, the height "
+         "on the "
+         "mesh of the last answer (without previous: of twice the tau); weight, 0 for those that move; parent_a, "
+         "parent_b, the rowids of the ends of the edge that a vertex halves.",
      .example = "SELECT count(*) FROM rqt_view(" CAMERA ")",
      .fill = fill_view,
-     .hidden = "col, row, q, achieved_tau, guaranteed, gpkg"},
+     .hidden = "col, row, q, achieved_tau, guaranteed, token, gpkg, parent_a, parent_b, z_from, weight"},
     {.name = "rqt_view_triangles",
      .arguments = VIEW,
      .returns = "id, x0, y0, z0, x1, y1, z1, x2, y2, z2",
@@ -152,19 +176,21 @@ const function rqt_functions[] = {
          "terrain, not exaggerated.",
      .example = "SELECT count(*), max(guaranteed) FROM rqt_view_triangles(" CAMERA ")",
      .fill = fill_view_triangles,
-     .hidden = "achieved_tau, guaranteed, gpkg"},
+     .hidden = "achieved_tau, guaranteed, token, gpkg"},
     {.name = "rqt_view_strip",
      .arguments = VIEW,
      .returns = "seq, x, y, z",
      .purpose = "The same triangles as one generalized strip, as of rqt_strip.",
      .example = "SELECT count(*) FROM rqt_view_strip(" CAMERA ")",
      .fill = fill_view_strip,
-     .hidden = "achieved_tau, guaranteed"},
+     .hidden = "achieved_tau, guaranteed, token"},
     {.name = "rqt_view_mesh",
      .arguments = "camera, format [, terrain [, options]]",
      .returns = "BLOB, TEXT for obj",
      .purpose =
-         "The mesh that a view needs as a file's bytes; formats as of rqt_mesh. The eps that a format has is "
+         "The mesh that a view needs as a file's bytes; formats as of rqt_mesh, and increment: what turns the mesh "
+         "of "
+         "option previous into this one, with the next token (src/core/FORMAT.md). The eps that a format has is "
          "infinite: a view promises pixels.",
      .example = "SELECT length(rqt_view_mesh(" CAMERA ", 'rqt'))",
      .call = call_view_mesh,
@@ -177,7 +203,7 @@ const function rqt_functions[] = {
      .purpose = "What the query of a view reads, as rqt_explain.",
      .example = "SELECT level, count(*), sum(bytes) FROM rqt_view_explain(" CAMERA ") GROUP BY level",
      .fill = fill_view_explain,
-     .hidden = "block, achieved_tau, guaranteed"},
+     .hidden = "block, achieved_tau, guaranteed, token"},
     {.name = "rqt_height",
      .arguments = "x, y [, eps [, terrain]]",
      .returns = "REAL",

@@ -21,6 +21,10 @@ void connection_done(connection *c);
 typedef struct places places;
 places **connection_places(connection *c);
 void places_release(places *p); /* NULL is fine */
+/* The last views that this connection has answered; follow.c. NULL: none. */
+typedef struct known_views known_views;
+known_views **connection_views(connection *c);
+void known_views_free(known_views *views); /* NULL is fine */
 
 /* ------------------------------------------------------------------------------------------- functions */
 /* The rows of one call of a table-valued function. */
@@ -29,6 +33,7 @@ typedef struct row_set {
     void *data;
     void (*column)(void *data, size_t row, int column, sqlite3_context *result);
     void (*release)(void *data); /* may be NULL */
+    uint32_t used;               /* told to fill: bit n, the query uses the nth of the further hidden columns */
 } row_set;
 
 /* Fill rows from the arguments (missing optional ones are NULL pointers); on failure *error is a sentence without
@@ -89,6 +94,8 @@ typedef struct request {
     space_frame *frame;        /* NULL for FRAME_CRS; frame.c */
     bool fans;                 /* the strip goes round the centres of blocks */
     int64_t max_vertices;      /* 0: any number */
+    int64_t max_triangles;     /* of a view; 0: any number */
+    char *previous;            /* of a view: "", or the token of the last answer; NULL: there is no next one */
     rqt_view_test test;        /* of a view */
     bool has_test, has_metric; /* the options name one */
     double achieved_eps; /* of the mesh: eps, or more to keep within max_vertices; known after request_patch */
@@ -101,6 +108,13 @@ int request_read(connection *c, sqlite3_value *region, sqlite3_value *eps, sqlit
 /* The same from a camera: a view. */
 int request_read_view(connection *c, sqlite3_value *camera, sqlite3_value *terrain, sqlite3_value *options,
                       request *out, char **error);
+/* The same for what wants more of the last answer (option previous) than that it may be this one: an increment from
+ * it, when what selects is not needed where nothing changes, or its mesh. follow.c */
+typedef enum view_wants { VIEW_ANSWER, VIEW_INCREMENT, VIEW_MORPH } view_wants;
+int request_follow_view(connection *c, sqlite3_value *camera, sqlite3_value *terrain, sqlite3_value *options,
+                        view_wants wants, request *out, char **error);
+/* What selects for the view as it is now: field, region, rule, frame; instead of what did. */
+int request_select_view(request *r, char **error);
 /* A patch with what the product needs; of strips, the one that the options want. Give it back with store_keep. */
 int request_patch(request *r, rqt_product product, rqt_patch *patch, store_reads *reads, char **error);
 /* Mode cut: that patch clipped to the region, instead. Release with rqt_cut_free. cut.c */
@@ -169,6 +183,7 @@ fill_rows fill_view, fill_view_triangles, fill_view_strip;                 /* me
 fill_rows fill_profile, fill_area;                                         /* profile.c, area.c */
 fill_rows fill_view_explain;                                               /* insight_tables.c */
 fill_rows fill_terrains, fill_explain, fill_verify, fill_check, fill_help; /* insight_tables.c, verify_table.c */
+fill_rows fill_view_verify;                                                /* view_verify.c */
 scalar_call call_version, call_build_info, call_mesh, call_view_mesh, call_height; /* scalar.c */
 scalar_call call_block_info, call_block_check, call_block_dump;                    /* block_functions.c */
 scalar_call call_bbox, call_circle, call_corridor;                                 /* shapes.c */

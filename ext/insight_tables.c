@@ -129,7 +129,7 @@ int fill_terrains(connection *c, sqlite3_value **arguments, row_set *rows, char 
     if (code != SQLITE_OK) return code;
     terrain_list *list;
     code = list_terrains(s, &list, error);
-    if (code == SQLITE_OK) *rows = (row_set){(size_t)list->count, list, terrains_column, release_terrains};
+    if (code == SQLITE_OK) *rows = (row_set){(size_t)list->count, list, terrains_column, release_terrains, 0};
     connection_done(c);
     return code;
 }
@@ -149,6 +149,7 @@ typedef struct explanation {
                             forced, children answer. The same in a view */
     double achieved_tau; /* of a view */
     bool guaranteed;
+    char *token; /* NULL: none */
 } explanation;
 
 /* Why this block was taken, and how much of it was read. */
@@ -179,6 +180,7 @@ static const char *reason_of(const explanation *e, const store_read *read) {
 
 static void release_explanation(void *data) {
     store_reads_free(&((explanation *)data)->reads);
+    sqlite3_free(((explanation *)data)->token);
     sqlite3_free(data);
 }
 
@@ -225,6 +227,9 @@ static void explain_column(void *data, size_t row, int column, sqlite3_context *
     case 8:
         sqlite3_result_int(result, e->guaranteed);
         break;
+    case 9:
+        sqlite3_result_text(result, e->token, -1, SQLITE_TRANSIENT);
+        break;
     default:
         sqlite3_result_int64(result, (sqlite3_int64)read->number);
         break;
@@ -245,14 +250,15 @@ static int explain(request *r, row_set *rows, char **error) {
         code = request_patch(r, RQT_PRODUCT_VERTICES, &patch, &e->reads, error);
         e->achieved_eps = r->achieved_eps;
         if (r->view) e->achieved_tau = r->view->achieved_tau, e->guaranteed = r->view->guaranteed;
+        if (code == SQLITE_OK && r->view) code = view_token_of(r, &patch, &e->token, error);
     }
     store_keep(r->store, &patch);
     request_free(r);
     if (code != SQLITE_OK) {
-        sqlite3_free(e);
+        if (e) release_explanation(e);
         return code;
     }
-    *rows = (row_set){e->reads.count, e, explain_column, release_explanation};
+    *rows = (row_set){e->reads.count, e, explain_column, release_explanation, 0};
     return SQLITE_OK;
 }
 
@@ -349,7 +355,7 @@ int fill_check(connection *c, sqlite3_value **arguments, row_set *rows, char **e
     }
     connection_done(c);
     if (code == SQLITE_OK)
-        *rows = (row_set){list->count, list, check_column, release_findings};
+        *rows = (row_set){list->count, list, check_column, release_findings, 0};
     else if (list)
         release_findings(list);
     return code;
@@ -386,6 +392,6 @@ static void help_column(void *data, size_t row, int column, sqlite3_context *res
 
 int fill_help(connection *c, sqlite3_value **arguments, row_set *rows, char **error) {
     (void)c, (void)arguments, (void)error;
-    *rows = (row_set){(size_t)rqt_function_count, NULL, help_column, NULL};
+    *rows = (row_set){(size_t)rqt_function_count, NULL, help_column, NULL, 0};
     return SQLITE_OK;
 }

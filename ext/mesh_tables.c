@@ -4,6 +4,7 @@
 
 #include "format.h"
 
+#include <math.h>
 #include <string.h>
 
 typedef struct mesh {
@@ -17,21 +18,31 @@ typedef struct mesh {
     bool is_view;
     double achieved_tau; /* of a view */
     bool guaranteed;
-    double *xyz; /* of each vertex, in a frame of its own; NULL: the terrain's CRS */
+    char *token;    /* NULL: none */
+    double *from;   /* of a view, if asked for: heights in quanta that vertices come from, NaN: they do not move */
+    uint32_t *ends; /* and the ends of the edges that they halve */
+    double *xyz;    /* of each vertex, in a frame of its own; NULL: the terrain's CRS */
 } mesh;
 
 static void release(void *data) {
     mesh *m = data;
     store_keep(m->store, &m->patch);
     sqlite3_free(m->xyz);
+    sqlite3_free(m->token);
+    sqlite3_free(m->from);
+    sqlite3_free(m->ends);
     rqt_cut_free(&m->cut);
     sqlite3_free(m);
+}
+
+static double metres(const mesh *m, double q) {
+    const rqt_unit *unit = &m->frame.unit;
+    return ((double)unit->z0 + q / (double)unit->d) * m->factor + unit->offset;
 }
 
 /* As format_coordinates says them, but only the one. */
 static double coordinate(const mesh *m, uint32_t vertex, int which) {
     const rqt_placement *at = &m->frame.placement;
-    const rqt_unit *unit = &m->frame.unit;
     double col, row, q;
     if (m->xyz) return m->xyz[3 * (size_t)vertex + (size_t)which];
     if (m->is_cut) {
@@ -43,7 +54,7 @@ static double coordinate(const mesh *m, uint32_t vertex, int which) {
     }
     if (which == 0) return at->x0 + col * at->dx;
     if (which == 1) return at->y0 + row * at->dy;
-    return ((double)unit->z0 + q / (double)unit->d) * m->factor + unit->offset;
+    return metres(m, q);
 }
 
 static void put_coordinate(const mesh *m, uint32_t vertex, int which, sqlite3_context *result) {
@@ -74,11 +85,15 @@ static int make_cut(request *r, rqt_product product, mesh *m, char **error) {
 }
 
 /* The mesh of the arguments, not yet as rows. */
+#define MORPH_COLUMNS (UINT32_C(15) << 7) /* of rqt_view: parent_a, parent_b, z_from, weight */
+
 static int make_mesh(connection *c, bool is_view, sqlite3_value **arguments, rqt_product product, row_set *rows,
                      mesh **out, char **error) {
     request r;
+    const bool morphs = is_view && product == RQT_PRODUCT_VERTICES && rows->used & MORPH_COLUMNS;
     int code =
-        is_view ? request_read_view(c, arguments[0], arguments[1], arguments[2], &r, error)
+        is_view ? request_follow_view(c, arguments[0], arguments[1], arguments[2],
+                                      morphs ? VIEW_MORPH : VIEW_ANSWER, &r, error)
                 : request_read(c, arguments[0], arguments[1], arguments[2], arguments[3], REQUEST_COVER, &r, error);
     if (code != SQLITE_OK) return code;
     mesh *m = sqlite3_malloc(sizeof *m);
@@ -94,6 +109,8 @@ static int make_mesh(connection *c, bool is_view, sqlite3_value **arguments, rqt
         m->achieved_eps = r.achieved_eps;
         m->is_view = is_view;
         if (is_view) m->achieved_tau = r.view->achieved_tau, m->guaranteed = r.view->guaranteed;
+        if (code == SQLITE_OK && is_view) code = view_token_of(&r, &m->patch, &m->token, error);
+        if (code == SQLITE_OK && morphs && !r.frame) code = view_morph(&r, &m->patch, &m->from, &m->ends, error);
         if (code == SQLITE_OK && r.frame) {
             code = frame_merge(r.frame, &m->patch);
             if (code == SQLITE_OK) code = frame_places(r.frame, &m->patch, &m->xyz, error);
@@ -111,13 +128,15 @@ static int make_mesh(connection *c, bool is_view, sqlite3_value **arguments, rqt
     return SQLITE_OK;
 }
 
-/* What is told of the whole mesh, in every row: achieved_eps; of a view achieved_tau and guaranteed. */
+/* What is told of the whole mesh, in every row: achieved_eps; of a view achieved_tau, guaranteed and token. */
 static int told_columns(const mesh *m) {
-    return m->is_view ? 2 : 1;
+    return m->is_view ? 3 : 1;
 }
 
 static void put_told(const mesh *m, int which, sqlite3_context *result) {
-    if (which == 1)
+    if (which == 2)
+        sqlite3_result_text(result, m->token, -1, SQLITE_TRANSIENT);
+    else if (which == 1)
         sqlite3_result_int(result, m->guaranteed);
     else
         sqlite3_result_double(result, m->is_view ? m->achieved_tau : m->achieved_eps);
@@ -148,9 +167,23 @@ static void patch_column(const mesh *m, size_t row, int column, sqlite3_context 
         sqlite3_result_int(result, column == 4 ? v->level : column == 5 ? v->col : column == 6 ? v->row : v->q);
 }
 
+/* parent_a, parent_b, z_from, weight: NULL in a frame of its own. */
+static void morph_column(const mesh *m, size_t row, int which, sqlite3_context *result) {
+    if (!m->from) return;
+    const double own = m->patch.vertices[row].q, from = isnan(m->from[row]) ? own : m->from[row];
+    if (which < 2 && m->ends[2 * row + (size_t)which] != RQT_NO_VERTEX)
+        sqlite3_result_int64(result, (sqlite3_int64)m->ends[2 * row + (size_t)which] + 1);
+    else if (which == 2)
+        sqlite3_result_double(result, metres(m, from));
+    else if (which == 3)
+        sqlite3_result_int(result, from == own);
+}
+
 static void range_column(void *data, size_t row, int column, sqlite3_context *result) {
     const mesh *m = data;
-    if (column < 3)
+    if (column > 8 + told_columns(m))
+        morph_column(m, row, column - 9 - told_columns(m), result);
+    else if (column < 3)
         put_coordinate(m, (uint32_t)row, column, result);
     else if (column == 8 + told_columns(m))
         put_geometry(m, &(const uint32_t){(uint32_t)row}, 1, result);

@@ -1,5 +1,4 @@
-/* options.c - the JSON object of options: which keys and values the contract has, and which of them this version
- * does. */
+/* options.c - the JSON object of options: which keys and values there are. */
 #include "functions.h"
 
 #include <cjson/cJSON.h>
@@ -8,22 +7,22 @@
 
 typedef struct choice {
     const char *key;
-    const char *done; /* values that work, between blanks; "#": an integer of 4 or more; "[": detail.c reads it */
-    const char *pending; /* values of the contract that are not in this version; "*": any value */
+    const char *done; /* values that work, between blanks; "#n": an integer of n or more; "[": detail.c reads it;
+                         "~": any text */
 } choice;
 
 static const choice choices[] = {
-    {"mode", " cover snap border cut ", ""},
-    {"outline", " exact tol ", ""},
-    {"metric", " exact minimal local wedgie euclid plane ", ""},
-    {"select", " threshold topdown bottomup ", ""},
-    {"strip", " bintree fan ", ""},
-    {"detail", "[", ""},
-    {"max_vertices", "#", ""},
-    {"max_triangles", "", "*"},
-    {"previous", "", "*"},
-    {"frame", " crs ecef enu ", ""},
-    {"test", " guaranteed ulrich node sphere lindstrom lodmap ", ""},
+    {"mode", " cover snap border cut "},
+    {"outline", " exact tol "},
+    {"metric", " exact minimal local wedgie euclid plane "},
+    {"select", " threshold topdown bottomup "},
+    {"strip", " bintree fan "},
+    {"detail", "["},
+    {"max_vertices", "#4"},
+    {"max_triangles", "#1"},
+    {"previous", "~"},
+    {"frame", " crs ecef enu "},
+    {"test", " guaranteed ulrich node sphere lindstrom lodmap "},
 };
 
 static bool holds(const char *words, const char *word) {
@@ -47,13 +46,17 @@ static int read_one(const cJSON *item, request *r, char **error) {
     for (size_t i = 0; i < sizeof choices / sizeof *choices; i++)
         if (strcmp(choices[i].key, item->string) == 0) c = &choices[i];
     if (!c) return fail(error, "unknown option \"%s\"", item->string);
-    if (c->pending[0] == '*') return fail(error, "option \"%s\" is not in this version", c->key);
     if (c->done[0] == '#') {
         const double n = cJSON_IsNumber(item) ? item->valuedouble : 0;
-        if (!(n >= 4 && n <= 9007199254740992.0 && n == floor(n)))
-            return fail(error, "option \"%s\" must be an integer of 4 or more", c->key);
-        r->max_vertices = (int64_t)n;
+        if (!(n >= c->done[1] - '0' && n <= 9007199254740992.0 && n == floor(n)))
+            return fail(error, "option \"%s\" must be an integer of %s or more", c->key, c->done + 1);
+        *(strcmp(c->key, "max_vertices") == 0 ? &r->max_vertices : &r->max_triangles) = (int64_t)n;
         return SQLITE_OK;
+    }
+    if (c->done[0] == '~') {
+        if (!cJSON_IsString(item)) return fail(error, "option \"%s\" must be a text", c->key);
+        r->previous = sqlite3_mprintf("%s", item->valuestring);
+        return r->previous ? SQLITE_OK : SQLITE_NOMEM;
     }
     if (c->done[0] == '[') {
         r->detail = cJSON_Duplicate(item, true);
@@ -62,7 +65,6 @@ static int read_one(const cJSON *item, request *r, char **error) {
     if (!cJSON_IsString(item))
         return fail(error, "option \"%s\" must be a text: one of%.*s", c->key, (int)strlen(c->done) - 1, c->done);
     const char *value = item->valuestring;
-    if (holds(c->pending, value)) return fail(error, "option \"%s\":\"%s\" is not in this version", c->key, value);
     if (!holds(c->done, value))
         return fail(error, "option \"%s\" has no value \"%s\"; this version knows%.*s", c->key, value,
                     (int)strlen(c->done) - 1, c->done);

@@ -12,13 +12,19 @@
  * T's extent. So the extent of T is at most reach; and s and v lie in T's box. Every metric counts mixed triangles
  * so (METHODS.md), and a selection by anything larger only has more vertices.
  *
- * Voids are looked for as far as MOST_REACH samples; where reach is more, they are taken to be just beyond.
+ * In a view eps differs from place to place, and so does reach. What is used of eps is that the split vertex of T
+ * is not selected, so any eps of a place that s lies in will do; a drawn sample S that is further than c * eps in
+ * that sense from all voids, for the eps that moves its place in the picture by tau, has to be covered.
+ *
+ * Voids are looked for as far as the window goes around its box; where reach is more, they are taken to be just
+ * beyond.
  */
 #include "promise.h"
 
 #include <string.h>
 
 #define MOST_REACH 1024
+#define ROWS_REACH 256 /* of a view: its rows are read once for those beside them */
 
 static bool is_valid(const promise *p, int32_t col, int32_t row) {
     if (col < p->col || row < p->row || col >= p->col + p->width || row >= p->row + p->height) return false;
@@ -26,10 +32,8 @@ static bool is_valid(const promise *p, int32_t col, int32_t row) {
 }
 
 /* The largest extent, in samples, that eps allows a mixed leaf. */
-static int32_t reach_of(const request *r) {
-    const store_terrain *t = r->terrain;
-    if (r->options.outline != RQT_OUTLINE_TOL || t->voids == 0) return 0;
-    const rqt_code eps = rqt_code_eps(r->achieved_eps, t->quantum_error);
+static int32_t reach_of(const store_terrain *t, double metres) {
+    const rqt_code eps = rqt_code_eps(metres, t->quantum_error);
     int32_t low = 0, high = (1 << t->lattice.K) + 1; /* low is allowed, high is too much or cannot be */
     while (high - low > 1) {
         const int32_t middle = low + (high - low) / 2;
@@ -57,9 +61,12 @@ static int count_voids(promise *p) {
     return SQLITE_OK;
 }
 
-int promise_begin(promise *p, const request *r, const int32_t box[4], char **error) {
+static bool has_reach(const request *r) {
+    return r->options.outline == RQT_OUTLINE_TOL && r->terrain->voids > 0;
+}
+
+static int begin(promise *p, const request *r, const int32_t box[4], int32_t around, char **error) {
     const rqt_lattice *lattice = &r->terrain->lattice;
-    const int32_t reach = reach_of(r), around = reach < MOST_REACH ? reach + 1 : MOST_REACH;
     const int32_t last_col = lattice->width - 1, last_row = lattice->height - 1;
     const int32_t x0 = box[0] > around ? box[0] - around : 0, y0 = box[1] > around ? box[1] - around : 0,
                   x1 = last_col - box[2] > around ? box[2] + around : last_col,
@@ -68,8 +75,8 @@ int promise_begin(promise *p, const request *r, const int32_t box[4], char **err
                    .row = y0,
                    .width = x1 - x0 + 1,
                    .height = y1 - y0 + 1,
+                   .terrain = r->terrain,
                    .region = r->region,
-                   .reach = reach,
                    .ends = {x0 == 0, y0 == 0, x1 == last_col, y1 == last_row}};
     const sqlite3_uint64 samples = (sqlite3_uint64)p->width * (sqlite3_uint64)p->height;
     const sqlite3_int64 most = store_limits_of(r->store)->samples;
@@ -82,8 +89,20 @@ int promise_begin(promise *p, const request *r, const int32_t box[4], char **err
     int code = p->q && p->valid ? SQLITE_OK : SQLITE_NOMEM;
     if (code == SQLITE_OK)
         code = store_window(r->store, r->terrain, p->col, p->row, p->width, p->height, p->q, p->valid, error);
-    if (code == SQLITE_OK && reach > 0) code = count_voids(p);
+    if (code == SQLITE_OK && has_reach(r)) code = count_voids(p);
     return code;
+}
+
+int promise_begin(promise *p, const request *r, const int32_t box[4], char **error) {
+    const int32_t reach = has_reach(r) ? reach_of(r->terrain, r->achieved_eps) : 0;
+    const int code = begin(p, r, box, reach < MOST_REACH ? reach + 1 : MOST_REACH, error);
+    p->reach = reach;
+    return code;
+}
+
+int promise_begin_rows(promise *p, const request *r, int32_t first, int32_t last, char **error) {
+    const int32_t box[4] = {0, first, r->terrain->lattice.width - 1, last};
+    return begin(p, r, box, has_reach(r) ? ROWS_REACH : 1, error);
 }
 
 void promise_free(promise *p) {
@@ -94,9 +113,9 @@ void promise_free(promise *p) {
 }
 
 /* Is a void within reach, or may there be one past the window? */
-static bool is_near_void(const promise *p, int32_t col, int32_t row) {
-    const int64_t x0 = (int64_t)col - p->col - p->reach, y0 = (int64_t)row - p->row - p->reach,
-                  x1 = (int64_t)col - p->col + p->reach + 1, y1 = (int64_t)row - p->row + p->reach + 1;
+static bool is_near_void(const promise *p, int32_t col, int32_t row, int32_t reach) {
+    const int64_t x0 = (int64_t)col - p->col - reach, y0 = (int64_t)row - p->row - reach,
+                  x1 = (int64_t)col - p->col + reach + 1, y1 = (int64_t)row - p->row + reach + 1;
     const bool past[4] = {x0<0, y0<0, x1> p->width, y1> p->height};
     for (int i = 0; i < 4; i++)
         if (past[i] && !p->ends[i]) return true;
@@ -126,7 +145,12 @@ static bool is_in_half_cell(const promise *p, int32_t col, int32_t row) {
 bool promise_holds(void *context, int32_t col, int32_t row) {
     const promise *p = context;
     if (!is_valid(p, col, row) || !rqt_region_contains(p->region, (rqt_vertex){col, row})) return false;
-    return is_in_half_cell(p, col, row) && (p->reach == 0 || !is_near_void(p, col, row));
+    return is_in_half_cell(p, col, row) && (p->reach == 0 || !is_near_void(p, col, row, p->reach));
+}
+
+bool promise_holds_within(const promise *p, int32_t col, int32_t row, double metres) {
+    if (!is_valid(p, col, row) || !is_in_half_cell(p, col, row)) return false;
+    return !p->voids || !is_near_void(p, col, row, reach_of(p->terrain, metres));
 }
 
 int64_t promise_half_cells(const promise *p) {

@@ -2,6 +2,7 @@
  * every function. */
 #include "view.h"
 
+#include <cjson/cJSON.h>
 #include <math.h>
 #include <string.h>
 
@@ -65,7 +66,11 @@ static int open(connection *c, sqlite3_value *terrain, sqlite3_value *options, r
             fail(error, "option \"%s\" does not go with mode \"cut\"", r->fans ? "strip\":\"fan" : "max_vertices");
     if (code == SQLITE_OK && r->mode == REQUEST_CUT && r->frame_kind != FRAME_CRS)
         code = fail(error, "option \"frame\" does not go with mode \"cut\"");
-    if (code == SQLITE_OK && r->has_test && !r->view) code = fail(error, "option \"test\" is for views");
+    const char *of_views = r->has_test            ? "test"
+                           : r->max_triangles > 0 ? "max_triangles"
+                           : r->previous          ? "previous"
+                                                  : NULL;
+    if (code == SQLITE_OK && of_views && !r->view) code = fail(error, "option \"%s\" is for views", of_views);
     if (code == SQLITE_OK) code = connection_store(c, &r->store, error);
     if (code == SQLITE_OK) r->connection = c;
     if (code == SQLITE_OK) code = request_terrain(r->store, terrain, &r->terrain, error);
@@ -92,11 +97,33 @@ int request_read(connection *c, sqlite3_value *region, sqlite3_value *eps, sqlit
 
 int request_read_view(connection *c, sqlite3_value *camera, sqlite3_value *terrain, sqlite3_value *options,
                       request *r, char **error) {
+    return request_follow_view(c, camera, terrain, options, VIEW_ANSWER, r, error);
+}
+
+int request_follow_view(connection *c, sqlite3_value *camera, sqlite3_value *terrain, sqlite3_value *options,
+                        view_wants wants, request *r, char **error) {
     *r = (request){.mode = REQUEST_COVER, .eps = INFINITY};
     int code = view_create(camera, &r->view, error);
     if (code == SQLITE_OK) code = open(c, terrain, options, r, error);
     if (code == SQLITE_OK) code = view_place(r, error);
-    return finish(r, code, error);
+    if (code == SQLITE_OK) code = view_settle(r, wants, error);
+    if (code != SQLITE_OK) request_free(r);
+    return code;
+}
+
+static void free_selection(request *r) {
+    frame_free(r->frame);
+    rule_free(r);
+    rqt_region_free(r->region);
+    r->frame = NULL;
+    r->region = NULL;
+}
+
+int request_select_view(request *r, char **error) {
+    free_selection(r);
+    int code = view_field(r, error);
+    if (code == SQLITE_OK) code = rule_read(r, error);
+    return code == SQLITE_OK ? frame_read(r, error) : code;
 }
 
 int request_patch(request *r, rqt_product product, rqt_patch *patch, store_reads *reads, char **error) {
@@ -118,10 +145,10 @@ int32_t request_srid(const request *r) {
 }
 
 void request_free(request *r) {
-    frame_free(r->frame);
-    rule_free(r);
+    free_selection(r);
     view_free(r->view);
-    rqt_region_free(r->region);
+    cJSON_Delete(r->detail);
+    sqlite3_free(r->previous);
     rqt_geometry_free(r->geometry);
     if (r->connection) connection_done(r->connection);
     *r = (request){0};

@@ -1,5 +1,5 @@
 /* scalar.c - the functions that give one value. */
-#include "functions.h"
+#include "view.h"
 
 #include "format.h"
 #include "geo.h"
@@ -150,16 +150,16 @@ static int cut_format(request *r, format_kind kind, uint8_t **bytes, size_t *siz
 
 /* What argument `format` asks for. */
 typedef struct mesh_format {
-    enum { MESH_STRIP, MESH_INDEXED, MESH_WIRE, MESH_OTHER } family;
+    enum { MESH_STRIP, MESH_INDEXED, MESH_WIRE, MESH_INCREMENT, MESH_OTHER } family;
     format_kind kind; /* of MESH_OTHER */
     bool normals;
     char name[16]; /* without "+normals"; cut where it is none of ours */
 } mesh_format;
 
-#define KNOWN " strip indexed rqt obj ply wkb gpkg spatialite ply+normals rqt+normals"
+#define KNOWN " strip indexed rqt increment obj ply wkb gpkg spatialite ply+normals rqt+normals"
 
 static int read_format(sqlite3_value *value, mesh_format *f, char **error) {
-    static const char *const own[] = {"strip", "indexed", "rqt"};
+    static const char *const own[] = {"strip", "indexed", "rqt", "increment"};
     static const char with_normals[] = "+normals";
     if (sqlite3_value_type(value) != SQLITE_TEXT) return fail(error, "format must be a text: one of%s", KNOWN);
     const char *text = (const char *)sqlite3_value_text(value);
@@ -168,7 +168,7 @@ static int read_format(sqlite3_value *value, mesh_format *f, char **error) {
     const bool normals = length > suffix && strcmp(text + length - suffix, with_normals) == 0;
     *f = (mesh_format){MESH_OTHER, FORMAT_OBJ, normals, ""};
     sqlite3_snprintf(sizeof f->name, f->name, "%.*s", (int)(normals ? length - suffix : length), text);
-    for (int i = 0; i < 3; i++)
+    for (int i = 0; i < 4; i++)
         if (strcmp(f->name, own[i]) == 0) f->family = i;
     if (strcmp(f->name, "glb") == 0) return fail(error, "format \"%s\" is not in this version", text);
     if (f->family == MESH_OTHER && !format_from_name(f->name, &f->kind))
@@ -211,6 +211,7 @@ static int make_mesh(request *r, const mesh_format *f, uint8_t **bytes, size_t *
         const int code = request_refuse_cut(r, what, error);
         if (code != SQLITE_OK) return code;
     }
+    if (f->family == MESH_INCREMENT) return view_increment(r, bytes, size, error);
     if (f->family == MESH_WIRE) return wire_mesh(r, f->normals, bytes, size, error);
     if (r->mode == REQUEST_CUT) return cut_format(r, f->kind, bytes, size, error);
     return patch_mesh(r, f, bytes, size, error);
@@ -239,8 +240,12 @@ static void call_with_format(sqlite3_context *result, bool is_view, int count, s
     size_t size = 0;
     int code = read_format(arguments[first], &f, &error);
     if (code == SQLITE_OK)
-        code = is_view ? request_read_view(c, arguments[0], terrain, options, &r, &error)
+        code = is_view ? request_follow_view(c, arguments[0], terrain, options,
+                                             f.family == MESH_INCREMENT ? VIEW_INCREMENT : VIEW_ANSWER, &r, &error)
                        : request_read(c, arguments[0], arguments[1], terrain, options, REQUEST_COVER, &r, &error);
+    if (code == SQLITE_OK && f.family == MESH_INCREMENT && !r.previous)
+        code = fail(&error,
+                    "format \"increment\" is for views with option \"previous\"; \"\" begins a sequence of them");
     if (code == SQLITE_OK) code = make_mesh(&r, &f, &bytes, &size, &error);
     request_free(&r);
     mesh_result(result, is_view ? "rqt_view_mesh" : "rqt_mesh", code, error, &f, bytes, size);

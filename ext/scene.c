@@ -121,7 +121,7 @@ static void planar_piece(const scene *s, const double low[3], const double high[
     piece->half_north = (high[1] - low[1]) / 2 * s->metre + slack;
     prism->radius = sqrt(piece->half_east * piece->half_east + piece->half_north * piece->half_north) + slack;
     prism->half_height = (high[2] - low[2]) / 2 * s->exaggeration + slack;
-    prism->upright = 1;
+    prism->upright = s->terrain->voids == 0; /* outlines of voids move sideways by as much as heights move */
 }
 
 static void geocentric_piece(const scene *s, const double low[3], const double high[3], rqt_view_piece *piece) {

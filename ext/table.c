@@ -146,6 +146,8 @@ static int best_index(sqlite3_vtab *base, sqlite3_index_info *info) {
         return SQLITE_ERROR;
     }
     if (unusable) return SQLITE_CONSTRAINT;
+    /* Which of the hidden columns behind the arguments are asked for, above the bits of the arguments. */
+    info->idxNum |= (int)(info->colUsed >> (t->columns + t->arguments) & 0x7FFFFF) << MOST_ARGUMENTS;
     int next = 1;
     for (int a = 0; a < t->arguments; a++) {
         if (constraint[a] < 0) continue;
@@ -194,6 +196,7 @@ static int filter(sqlite3_vtab_cursor *base, int index, const char *text, int ar
         if (!c->argument[a]) return SQLITE_NOMEM;
     }
     char *sentence = NULL;
+    c->rows.used = (uint32_t)index >> MOST_ARGUMENTS;
     const int code = t->function->fill(t->connection, c->argument, &c->rows, &sentence);
     if (code != SQLITE_OK && sentence) {
         sqlite3_free(base->pVtab->zErrMsg);

@@ -16,6 +16,7 @@ int view_create(sqlite3_value *camera, view **out, char **error) {
 void view_free(view *v) {
     if (!v) return;
     rqt_field_free(v->field);
+    rqt_patch_free(&v->last_mesh);
     scene_free(&v->scene);
     sqlite3_free(v);
 }
@@ -26,6 +27,9 @@ static int check_options(request *r, char **error) {
     if (r->mode != REQUEST_COVER) return fail(error, "option \"mode\" of a view must be cover");
     if (r->max_vertices > 0) return fail(error, "option \"max_vertices\" does not go with a view");
     if (r->test == RQT_VIEW_GUARANTEED) return SQLITE_OK;
+    if (r->previous)
+        return fail(
+            error, "option \"previous\" does not go with \"test\":\"%s\": it promises nothing near a camera", test);
     if (r->has_metric)
         return fail(error, "option \"metric\" does not go with \"test\":\"%s\", which is about the metric %s", test,
                     rqt_metric_name(rqt_view_test_metric(r->test)));
@@ -38,8 +42,7 @@ int view_place(request *r, char **error) {
     int code = check_options(r, error);
     const bool geoid = r->frame_kind != FRAME_CRS && terrain_is_above_geoid(r->terrain);
     v->test = r->test;
-    v->guaranteed = v->test == RQT_VIEW_GUARANTEED;
     if (code == SQLITE_OK) code = scene_create(&v->scene, r->terrain, v->words.exaggeration, geoid, error);
     if (code == SQLITE_OK) code = camera_make(r->connection, &v->scene, &v->words, &v->camera, error);
-    return code == SQLITE_OK ? view_field(r, v, &r->region, error) : code;
+    return code;
 }

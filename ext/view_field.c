@@ -17,6 +17,8 @@
  * ten thousand squares. */
 #define WORTH_CUTTING 1.0
 
+#define BAND_PRICE 1.2 /* what a band takes of the best anyway, and cutting does not give back */
+
 /* What may be seen grows to squares of a side of at least half a 32nd of their distance: 2 % more vertices, but a
  * rim of half as many pieces, and the walk asks it at every step along it. */
 #define RIM_STEPS 32
@@ -34,7 +36,11 @@ typedef struct builder {
     const store_terrain *terrain;
     store_relief relief[RQT_MAX_K + 1]; /* of the square at hand and of those around it, by level */
     square_list shown;
-    uint32_t asked; /* squares */
+    bool
+        finer_than_stored; /* somewhere in it the tolerance is below what rounding took from the source's heights */
+    uint32_t asked;        /* squares */
+    rqt_camera cutting;    /* the camera that says which squares are cut */
+    double nearest;        /* so far */
     int code;
     char **error;
 } builder;
@@ -42,7 +48,7 @@ typedef struct builder {
 /* --------------------------------------------------------------------------------------------- what is seen -- */
 
 static bool is_in(rqt_square inner, rqt_square outer) {
-    return inner.x >= outer.x && inner.y >= outer.y && inner.x < outer.x + outer.side &&
+    return inner.side <= outer.side && inner.x >= outer.x && inner.y >= outer.y && inner.x < outer.x + outer.side &&
            inner.y < outer.y + outer.side;
 }
 
@@ -153,34 +159,96 @@ static double worth_of(const builder *b, rqt_square square, int level, const rqt
     return now * now - then * then;
 }
 
+/* The piece of the scene that holds a square's samples. */
+static int find_piece(builder *b, rqt_square square, int *level, rqt_view_piece *piece) {
+    if (++b->asked % ASKED_AT_A_TIME == 0 && store_is_interrupted(b->store, &b->code)) return b->code;
+    const rqt_lattice *lattice = &b->terrain->lattice;
+    *level = lattice->K;
+    while (square.side >> (lattice->K - *level) > 1) --*level;
+    b->code = find_relief(b, square, *level);
+    if (b->code != SQLITE_OK) return b->code;
+    const store_relief *relief = &b->relief[*level];
+    scene_piece(&b->view->scene, square, relief->lowest, relief->highest, piece);
+    return SQLITE_OK;
+}
+
+/* How squares are cut does not depend on achieved_tau: so with more of it no square gets less, and what is not
+ * shown stays so. In a band it goes by a camera that sees what all of them see: the piece's share of what it could
+ * have tells nothing there, for no part of it could have that. */
 static rqt_field_step decide(void *context, rqt_square square, double *eps) {
     builder *b = context;
-    if (++b->asked % ASKED_AT_A_TIME == 0 && store_is_interrupted(b->store, &b->code)) return RQT_FIELD_FAIL;
     const view *v = b->view;
-    const rqt_lattice *lattice = &b->terrain->lattice;
-    int level = lattice->K;
-    while (square.side >> (lattice->K - level) > 1) level--;
-    b->code = find_relief(b, square, level);
-    if (b->code != SQLITE_OK) return RQT_FIELD_FAIL;
-    const store_relief *relief = &b->relief[level];
     rqt_view_piece piece;
     rqt_view_bound bound;
-    scene_piece(&v->scene, square, relief->lowest, relief->highest, &piece);
-    rqt_view_test_bound(v->test, &v->camera, &piece, &bound);
+    int level = 0;
+    if (find_piece(b, square, &level, &piece) != SQLITE_OK) return RQT_FIELD_FAIL;
+    rqt_view_test_bound(v->test, &b->cutting, &piece, &bound);
+    if (v->has_band) {
+        const double best = bound.share > 0 ? bound.eps / bound.share : INFINITY;
+        rqt_view_tolerance_in_band(&v->camera, &v->band, &piece.prism, &bound);
+        bound.share = best > 0 ? fmin(bound.eps / best * BAND_PRICE, 1) : 1;
+    }
     if (square.side > 1 && worth_of(b, square, level, &bound) > WORTH_CUTTING) return RQT_FIELD_SPLIT;
+    const bool shown = bound.shown;
+    if (v->achieved_tau != v->camera.tau) {
+        rqt_camera coarse = v->camera;
+        coarse.tau = v->achieved_tau;
+        if (v->has_band)
+            rqt_view_tolerance_in_band(&coarse, &v->band, &piece.prism, &bound);
+        else
+            rqt_view_test_bound(v->test, &coarse, &piece, &bound);
+    }
     *eps = bound.eps / v->scene.exaggeration;
-    if (!bound.shown || add_square(&b->shown, grow_square(square, &piece, bound.distance, lattice)))
+    b->finer_than_stored |= shown && *eps < b->terrain->quantum_error;
+    if (!shown || add_square(&b->shown, grow_square(square, &piece, bound.distance, &b->terrain->lattice)))
         return RQT_FIELD_LEAF;
     b->code = SQLITE_NOMEM;
     return RQT_FIELD_FAIL;
 }
 
-int view_field(const request *r, view *v, rqt_region **region, char **error) {
+static int ended(const builder *b, rqt_status status, char **error) {
+    if (status == RQT_INVALID) return fail(error, "camera: what it sees cannot be worked out");
+    return status == RQT_READ_FAILED ? b->code : status == RQT_OK ? SQLITE_OK : SQLITE_NOMEM;
+}
+
+int view_field(request *r, char **error) {
+    view *v = r->view;
     builder b = {.view = v, .store = r->store, .terrain = r->terrain, .error = error};
+    b.cutting = v->has_band ? rqt_camera_widen(&v->camera, &v->band) : v->camera;
+    rqt_field_free(v->field);
     const rqt_status status = rqt_field_create(&r->terrain->lattice, store_allocator(), decide, &b, &v->field);
-    int code = status == RQT_READ_FAILED ? b.code : status == RQT_OK ? SQLITE_OK : SQLITE_NOMEM;
-    if (status == RQT_INVALID) code = fail(error, "camera: what it sees cannot be worked out");
-    if (code == SQLITE_OK) code = region_of(&b.shown, r->terrain, region);
+    int code = ended(&b, status, error);
+    v->guaranteed = v->test == RQT_VIEW_GUARANTEED && !b.finer_than_stored;
+    if (code == SQLITE_OK) code = region_of(&b.shown, r->terrain, &r->region);
     sqlite3_free(b.shown.items);
     return code;
+}
+
+/* ------------------------------------------------------------------------------------------------- nearest -- */
+
+#define NEAR_ENOUGH 0.75 /* of what the best part of a square gets */
+
+/* As a field that is thrown away: squares that cannot be nearer than what is known are not cut. */
+static rqt_field_step look_nearer(void *context, rqt_square square, double *eps) {
+    builder *b = context;
+    const view *v = b->view;
+    rqt_view_piece piece;
+    rqt_view_bound bound;
+    int level = 0;
+    if (find_piece(b, square, &level, &piece) != SQLITE_OK) return RQT_FIELD_FAIL;
+    rqt_view_test_bound(v->test, &v->camera, &piece, &bound);
+    *eps = 0;
+    if (!bound.shown || bound.distance >= b->nearest) return RQT_FIELD_LEAF;
+    if (square.side > 1 && bound.share < NEAR_ENOUGH) return RQT_FIELD_SPLIT;
+    b->nearest = bound.distance;
+    return RQT_FIELD_LEAF;
+}
+
+int view_nearest(request *r, double *nearest, char **error) {
+    builder b = {.view = r->view, .store = r->store, .terrain = r->terrain, .nearest = INFINITY, .error = error};
+    rqt_field *field = NULL;
+    const rqt_status status = rqt_field_create(&r->terrain->lattice, store_allocator(), look_nearer, &b, &field);
+    rqt_field_free(field);
+    *nearest = isinf(b.nearest) ? 0 : b.nearest;
+    return ended(&b, status, error);
 }

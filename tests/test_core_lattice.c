@@ -38,6 +38,41 @@ static int holds(const rqt_vertex *list, int count, oracle_point p) {
     return found;
 }
 
+/* Over all triangles: the ends of what the split vertex halves. */
+static void check_ends(const rqt_lattice *l, const oracle_triangle *t) {
+    oracle_triangle child[2];
+    rqt_vertex ends[2];
+    if (!oracle_children(t, child)) return;
+    const oracle_point split = child[0].corner[0];
+    assert_int_equal(rqt_vertex_ends(l, (rqt_vertex){split.x, split.y}, ends), 2);
+    CHECK(holds(ends, 2, t->corner[1]) == 1 && holds(ends, 2, t->corner[2]) == 1, "the ends of (%d,%d)", split.x,
+          split.y);
+    for (int c = 0; c < 2; c++) check_ends(l, &child[c]);
+}
+
+static void a_vertex_halves_the_edge_between_its_ends(void **state) {
+    (void)state;
+    for (int K = 0; K <= 6; K++) {
+        const int side = (1 << K) + 1;
+        int *q = calloc((size_t)(side * side), sizeof *q);
+        const oracle_terrain terrain = {side, side, q, NULL, 1.0, 1, 1, 1, 1.0, 1.0};
+        oracle o;
+        rqt_lattice l;
+        rqt_vertex ends[2];
+        oracle_create_bare(&o, &terrain);
+        assert_int_equal(rqt_lattice_init(&l, side, side), RQT_OK);
+        for (int half = 0; half < 2; half++) {
+            const oracle_triangle t = oracle_root_half(&o, half);
+            check_ends(&l, &t);
+        }
+        for (int c = 0; c < 4; c++)
+            assert_int_equal(rqt_vertex_ends(&l, (rqt_vertex){c & 1 ? side - 1 : 0, c & 2 ? side - 1 : 0}, ends),
+                             0);
+        oracle_free(&o);
+        free(q);
+    }
+}
+
 static void parents_children_and_levels_equal_the_oracles_graph(void **state) {
     (void)state;
     random_begin("graph");
@@ -453,6 +488,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         TEST(the_root_square_is_the_smallest_that_holds_the_raster),
         TEST(parents_children_and_levels_equal_the_oracles_graph),
+        TEST(a_vertex_halves_the_edge_between_its_ends),
         TEST(F47_the_largest_lattice_is_consistent),
         TEST(errors_equal_the_oracles_for_every_small_extent),
         TEST(errors_equal_the_oracles_on_adversarial_surfaces),

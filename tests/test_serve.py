@@ -63,7 +63,7 @@ def finite(rows):
 answer = ask(HILLS + "/range", {"wkt": WKT, "eps": 30})
 equal("range without f is JSON of rqt_range's rows", (answer.content_type, answer.json()["rows"]),
       ("application/json", finite(s.rows(db, "SELECT * FROM rqt_range(?1, 30, 'hills')", WKT))))
-equal("and says the eps that was achieved", answer.json()["achieved_eps"], 30)
+equal("and says the eps that was achieved", answer.json().get("achieved_eps"), 30)
 answer = ask(HILLS + "/range", {"eps": "9e999"})
 equal("range of everything at the coarsest eps, infinite errors null", answer.json()["rows"],
       finite(s.rows(db, "SELECT * FROM rqt_range(NULL, 9e999, 'hills')")))
@@ -547,8 +547,9 @@ with open(s.temp("junk"), "wb") as f:
     f.write(b"junk" * 5000)
 os.rename(s.temp("junk"), other)
 answer = ask("/collections")
-equal("one that is damaged does not hide the other", [c["id"] for c in answer.json()["collections"]], ["hills", "plain"])
-check("but is named", answer.json()["problems"][0]["database"] == "other.gpkg" and "not a database" in answer.json()["problems"][0]["detail"], answer.body[-300:])
+equal("one that is damaged does not hide the other", [c["id"] for c in answer.json().get("collections", [])], ["hills", "plain"])
+problems = answer.json().get("problems", [])
+check("but is named", [p["database"] for p in problems] == ["other.gpkg"] and "not a database" in problems[0]["detail"], answer.body[-300:])
 equal("what the other has is answered", ask(PLAIN).body, sql_of(one))
 equal("what neither has may be in the damaged one", ask("/collections/nobody").status, 500)
 equal("it ends", service.stop(), (0, ""))

@@ -71,6 +71,18 @@ int rqt_vertex_parents(const rqt_lattice *lattice, rqt_vertex v, rqt_vertex pare
     return n;
 }
 
+int rqt_vertex_ends(const rqt_lattice *lattice, rqt_vertex v, rqt_vertex ends[2]) {
+    if (lattice_is_corner(lattice, v)) return 0;
+    const int scale = rqt_vertex_scale(lattice, v);
+    const int32_t q = 1 << scale;
+    const bool x_odd = (v.x >> scale) & 1, y_odd = (v.y >> scale) & 1;
+    const bool main_diagonal = ((((v.x - q) ^ (v.y - q)) >> (scale + 1)) & 1) == 0;
+    const int32_t dx = x_odd ? q : 0, dy = !y_odd ? 0 : x_odd && !main_diagonal ? -q : q;
+    ends[0] = (rqt_vertex){v.x - dx, v.y - dy};
+    ends[1] = (rqt_vertex){v.x + dx, v.y + dy};
+    return 2;
+}
+
 int rqt_vertex_children(const rqt_lattice *lattice, rqt_vertex v, rqt_vertex children[4]) {
     static const int step[4][2] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}};
     const int scale = rqt_vertex_scale(lattice, v);

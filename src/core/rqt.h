@@ -90,6 +90,9 @@ int rqt_vertex_rank(const rqt_lattice *lattice, rqt_vertex v);
 /* The vertices that v depends on, at most two; returns their number: 0 for corners, 1 for a midpoint of the
  * root's border, 2 otherwise. */
 int rqt_vertex_parents(const rqt_lattice *lattice, rqt_vertex v, rqt_vertex parents[2]);
+/* The ends of the edge that v halves, which have higher scales than v; returns their number: 0 for corners, else 2.
+ */
+int rqt_vertex_ends(const rqt_lattice *lattice, rqt_vertex v, rqt_vertex ends[2]);
 /* The vertices that depend on v, at most four; returns their number. */
 int rqt_vertex_children(const rqt_lattice *lattice, rqt_vertex v, rqt_vertex children[4]);
 /* The sample that a lattice vertex stands for. */
@@ -931,6 +934,66 @@ rqt_status rqt_wire_normals(const uint8_t *bytes, size_t size, size_t vertex_cou
                             float *normals, rqt_message *message);
 /* What an increment knows a mesh by: its vertices, their levels and heights, and its leaves, in their order. */
 uint64_t rqt_wire_digest(const rqt_patch *patch);
+
+/* ------------------------------------------------------------------------------------------ geomorphs --
+ * From one mesh of a terrain to another without a jump: over the mesh of the union of their vertices (the mesh of
+ * the field with the lesser eps at each place), each vertex moves from its height on the one to that on the other.
+ * At the time t, 0 .. 1, each sample is within (1-t) times what the one mesh allows and t times what the other
+ * does, wherever both have a mesh; at the ends it is the one and the other, exactly, except near the raster's last
+ * column and row where these are not the lattice's: there vertices do not move. See morph.c. */
+#define RQT_NO_VERTEX UINT32_MAX
+
+/* The heights, in quanta, of the vertices of a patch on the mesh `from` (with leaves), a patch of the same terrain:
+ * exact, and NaN where `from` has no mesh. (NaN too where one depends on a vertex near the raster's end that is in
+ * neither patch, which happens at the patch's rim.) ends, unless NULL: two per vertex, the indices of the ends of
+ * the edge that it halves, RQT_NO_VERTEX for one that is not in the patch and for vertices near the raster's end.
+ * RQT_INVALID when `from` has no leaves. */
+rqt_status rqt_morph_heights(const rqt_lattice *lattice, const rqt_patch *from, const rqt_patch *patch,
+                             const rqt_allocator *allocator, double *heights, uint32_t *ends);
+
+/* --------------------------------------------------------------------------------------- increments --
+ * What turns one mesh into another, for views that follow a camera (FORMAT.md, "View increment"): vertices and
+ * triangles that go, and those that come. Both ends number a mesh in one way, so that neither has to know how the
+ * other came by it: rqt_patch_sort. Of vertices only col, row and q count. */
+#define RQT_INCREMENT_HEADER_BYTES 48
+
+typedef struct rqt_increment_header {
+    uint64_t from, to;                     /* rqt_increment_digest of the meshes that it begins from and ends in */
+    uint64_t vertex_count, triangle_count; /* of the mesh that it ends in */
+    bool is_unchanged;
+    const void *note; /* bytes of the sender's own, which travel along */
+    size_t note_size; /* below 2^31 */
+    /* What makes places and metres of a mesh: told with an increment from nothing. */
+    bool has_frame;
+    rqt_placement placement;
+    rqt_unit unit;
+    double eps;
+    int32_t srid;
+} rqt_increment_header;
+
+/* Vertices along the Morton curve (column in the even bits), triangles by the numbers of their vertices, first to
+ * third; leaves go with their triangles; there is no strip. Samples are told apart by col and row. RQT_NO_MEMORY:
+ * the patch is freed. */
+rqt_status rqt_patch_sort(rqt_patch *patch);
+/* What an increment knows a sorted mesh by: col, row and q of its vertices, its triangles. */
+uint64_t rqt_increment_digest(const rqt_patch *sorted);
+/* The most bytes that rqt_increment_encode can write. old NULL: from nothing. */
+size_t rqt_increment_bound(const rqt_patch *old, const rqt_patch *fresh, size_t note_size);
+/* Both sorted. Of the header note, placement, unit, eps and srid are read. Equal meshes give equal bytes. old ==
+ * fresh: that nothing changes, in RQT_INCREMENT_HEADER_BYTES and the note; without a frame. RQT_INVALID for more
+ * than 2^32 bytes. */
+rqt_status rqt_increment_encode(const rqt_increment_header *header, const rqt_patch *old, const rqt_patch *fresh,
+                                const rqt_allocator *allocator, uint8_t *bytes, size_t *size);
+/* Header only; the checksum of all bytes is compared. header->note points into bytes. */
+rqt_status rqt_increment_info(const uint8_t *bytes, size_t size, rqt_increment_header *header,
+                              rqt_message *message);
+/* The mesh that an increment makes of `old` (sorted; NULL: nothing), sorted: the sender's vertices and triangles,
+ * with errors and levels 0. Trusts nothing: any input gives RQT_OK, RQT_CORRUPT, RQT_INVALID for an increment from
+ * another mesh, or RQT_NO_MEMORY; the memory taken is bounded by old and by the size of the payload, at most 2^15
+ * times that of the bytes. */
+rqt_status rqt_increment_apply(const rqt_patch *old, const uint8_t *bytes, size_t size,
+                               const rqt_allocator *allocator, rqt_increment_header *header, rqt_patch *mesh,
+                               rqt_message *message);
 
 #ifdef __cplusplus
 }

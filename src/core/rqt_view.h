@@ -74,6 +74,26 @@ typedef struct rqt_view_bound {
  * rqt_camera_look; numbers that are not finite, or too large to be squared, give eps 0. */
 void rqt_view_tolerance(const rqt_camera *camera, const rqt_prism *prism, rqt_view_bound *bound);
 
+/* -------------------------------------------------------------------------------------------------- bands --
+ * A view that is also right for cameras near the one it was made for: view_band.c has the proof. */
+typedef struct rqt_view_band {
+    double move; /* how far the eye may go, metres of the scene */
+    double turn; /* how far the camera may turn, around any axis: 2 sin(half the angle) */
+} rqt_view_band;
+
+/* A band that costs about a sixteenth of the tolerance (where pieces are seen slantwise a tenth), and some ground
+ * beside what the camera sees: nearest is how far what is nearest of the terrain is from the eye, about (wrong, the
+ * band is still right, but too dear or too narrow). move and turn are > 0. */
+rqt_view_band rqt_camera_band(const rqt_camera *camera, double nearest);
+/* Is a camera within the band of another? One lens, tau and range of depths are needed: all that is not eye and
+ * directions must be equal. */
+bool rqt_camera_holds(const rqt_camera *anchor, const rqt_view_band *band, const rqt_camera *camera);
+/* A camera that sees about what those of the band see together: where to look more closely. */
+rqt_camera rqt_camera_widen(const rqt_camera *anchor, const rqt_view_band *band);
+/* rqt_view_tolerance that holds for every camera of the band. */
+void rqt_view_tolerance_in_band(const rqt_camera *anchor, const rqt_view_band *band, const rqt_prism *prism,
+                                rqt_view_bound *bound);
+
 /* ---------------------------------------------------------------------------------------------- other tests --
  * Tests of the literature, by name, for comparing: they guarantee nothing on the screen. Each says how large the
  * error of its own metric may be in a piece; METHODS.md, "Views", has definitions, sources and what was mended. */

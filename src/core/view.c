@@ -47,8 +47,7 @@
  * a tenth of a micrometre at 10^7 m, ten of them at 10^9 m. What is a product of few factors, kappa, is right to
  * far less than RELATIVE, by which eps is made smaller; t is where it comes from subtracting, and is then used only
  * below 100 (89.4 degrees off the axis). A sum that is not a number (an eye at 10^300 m) gives eps 0, shown. */
-#include "internal.h"
-#include "rqt_view.h"
+#include "view.h"
 
 #include <math.h>
 
@@ -274,15 +273,17 @@ static double allowed(double kappa, double sine, double distance) {
     return distance * (kappa / smaller(sine + kappa, 1));
 }
 
-void rqt_view_tolerance(const rqt_camera *camera, const rqt_prism *prism, rqt_view_bound *bound) {
-    const sight s = see(camera, prism);
+void view_tolerance(const rqt_camera *camera, const rqt_prism *place, const rqt_prism *picture,
+                    rqt_view_bound *bound) {
+    const sight s = see(camera, place), seen_as = place == picture ? s : see(camera, picture);
     const double corner = sqrt(s.halfwidth[0] * s.halfwidth[0] + s.halfwidth[1] * s.halfwidth[1]),
                  pixel = camera->tau / camera->focal,
-                 slack = SLACK * (fabs(s.at[0]) + fabs(s.at[1]) + fabs(s.at[2]) + s.radius + s.half_height);
+                 slack =
+                     SLACK * (fabs(s.at[0]) + fabs(s.at[1]) + fabs(s.at[2]) + seen_as.radius + seen_as.half_height);
     const double up = above_zero(fabs(s.along) - s.half_height - slack),
                  aside = above_zero(s.across - s.radius - slack), distance = sqrt(up * up + aside * aside);
-    const range t = tangents(&s, corner), sine = sines(&s, prism->upright);
-    const gap g = beyond(camera, &s);
+    const range t = tangents(&seen_as, corner), sine = sines(&s, place->upright);
+    const gap g = beyond(camera, &seen_as);
     const double drawn = RELATIVE * allowed(kappa(pixel, t.largest), sine.largest, larger(distance, camera->near)),
                  hidden = RELATIVE * (g.whole - slack);
     *bound = (rqt_view_bound){.eps = larger(drawn, hidden), .shown = !(hidden >= drawn), .distance = distance};
@@ -296,4 +297,8 @@ void rqt_view_tolerance(const rqt_camera *camera, const rqt_prism *prism, rqt_vi
     bound->share = best > 0 ? smaller(bound->eps / best, 1) : 1;
     if (!(isfinite(slack) && isfinite(drawn) && isfinite(bound->eps) && bound->eps >= 0 && bound->share >= 0))
         *bound = (rqt_view_bound){.eps = 0, .shown = true, .distance = 0, .share = 0};
+}
+
+void rqt_view_tolerance(const rqt_camera *camera, const rqt_prism *prism, rqt_view_bound *bound) {
+    view_tolerance(camera, prism, prism, bound);
 }

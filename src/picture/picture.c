@@ -58,7 +58,7 @@ static void add_margin(const picture_page *page, int32_t box[4]) {
 
 static int choose_window(picture_page *page, char **error) {
     const store_terrain *t = page->terrain;
-    int32_t box[4];
+    int32_t box[4] = {0};
     const int code = region_box(t, page->region, box, error);
     if (code != SQLITE_OK) return code;
     if (page->region) {

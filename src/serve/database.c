@@ -132,7 +132,7 @@ static uint64_t read_state(const database *d, bool *is_wal) {
     *is_wal = header[HEADER_READ_VERSION] == WAL_VERSION;
     if (*is_wal) {
         void volatile *region = NULL;
-        unsigned char index[INDEX_BYTES];
+        unsigned char index[INDEX_BYTES] = {0};
         if (handle->pMethods->iVersion < 2 ||
             handle->pMethods->xShmMap(handle, 0, INDEX_REGION, 0, &region) != SQLITE_OK || !region)
             return 0;

@@ -166,7 +166,7 @@ static enum MHD_Result send_answer(request *r) {
     pthread_mutex_lock(&all->lock);
     if (all->is_closing) put(response, MHD_HTTP_HEADER_CONNECTION, "close");
     pthread_mutex_unlock(&all->lock);
-    set_phase(all, r->connection, PEER_TAKES, TAKING_SECONDS + (double)(size / TAKING_BYTES), 0);
+    set_phase(all, r->connection, PEER_TAKES, TAKING_SECONDS + (double)size / TAKING_BYTES, 0);
     r->phase = REQUEST_SENT;
     const enum MHD_Result result = MHD_queue_response(r->connection, a->status, response);
     MHD_destroy_response(response);

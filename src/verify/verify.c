@@ -22,8 +22,7 @@ bool verify_samples_are_sound(const verify_samples *samples) {
     return isfinite(samples->quantum) && samples->quantum > 0;
 }
 
-static bool input_is_sound(const verify_samples *samples, const verify_triangle *triangles, size_t n) {
-    if (!verify_samples_are_sound(samples)) return false;
+static bool corners_are_sound(const verify_samples *samples, const verify_triangle *triangles, size_t n) {
     if (triangles == NULL && n > 0) return false;
     for (size_t t = 0; t < n; t++) {
         for (int k = 0; k < 3; k++) {
@@ -47,19 +46,33 @@ static uint64_t sum_twice_area(const verify_triangle *triangles, size_t n) {
     return sum > UINT64_MAX ? UINT64_MAX : (uint64_t)sum;
 }
 
-verify_status verify_mesh(const verify_samples *samples, const verify_triangle *triangles, size_t n,
-                          verify_report *report) {
-    if (samples == NULL || report == NULL) return VERIFY_INVALID;
-    memset(report, 0, sizeof *report);
-    if (!input_is_sound(samples, triangles, n)) return VERIFY_INVALID;
-
+static verify_status judge(const verify_samples *samples, const verify_triangle *triangles, size_t n,
+                           bool has_samples, verify_report *report) {
     verify_report found = {.triangles = n};
     found.twice_area = sum_twice_area(triangles, n);
     found.area = (double)found.twice_area / 2 * fabs(samples->cell_x * samples->cell_y);
     verify_status status = verify_measure_cracks(samples, triangles, n, &found);
     if (status == VERIFY_OK) status = verify_measure_overlaps(triangles, n, &found);
-    if (status == VERIFY_OK) status = verify_measure_error(samples, triangles, n, &found);
+    if (status == VERIFY_OK && has_samples) status = verify_measure_error(samples, triangles, n, &found);
     /* A report is whole or all zeros, so that nobody reads half of one as a clean mesh's. */
     if (status == VERIFY_OK) *report = found;
     return status;
+}
+
+verify_status verify_mesh(const verify_samples *samples, const verify_triangle *triangles, size_t n,
+                          verify_report *report) {
+    if (samples == NULL || report == NULL) return VERIFY_INVALID;
+    memset(report, 0, sizeof *report);
+    if (!verify_samples_are_sound(samples) || !corners_are_sound(samples, triangles, n)) return VERIFY_INVALID;
+    return judge(samples, triangles, n, true, report);
+}
+
+verify_status verify_topology(const verify_triangle *triangles, size_t n, verify_report *report) {
+    /* A window that holds all places there can be, and no samples. */
+    const int32_t from = -VERIFY_CORNER_LIMIT, side = 2 * VERIFY_CORNER_LIMIT;
+    const verify_samples everywhere = {.col0 = from, .row0 = from, .width = side, .height = side};
+    if (report == NULL) return VERIFY_INVALID;
+    memset(report, 0, sizeof *report);
+    if (!corners_are_sound(&everywhere, triangles, n)) return VERIFY_INVALID;
+    return judge(&everywhere, triangles, n, false, report);
 }

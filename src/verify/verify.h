@@ -75,15 +75,19 @@ typedef enum verify_status {
  * Counter-clockwise seen from above: with rows growing south, corner a, b, c have
  * (bx-ax)*(cy-ay) - (cx-ax)*(by-ay) < 0.
  *
- * Memory: 8 bytes per sample of the window, and up to some 100 per triangle. Time: in step with the samples in all
+ * Memory: 8 bytes per sample of the window, and up to some 300 per triangle. Time: in step with the samples in all
  * triangles, plus the triangles whose boxes are alike in size and place. */
 verify_status verify_mesh(const verify_samples *samples, const verify_triangle *triangles, size_t n,
                           verify_report *report);
 
-/* The same for meshes whose vertices lie between samples, as clipping makes them. Places are doubles and taken at
- * their word: turning, overlaps, T-junctions and which samples a triangle covers are exact, and need all places to
- * be multiples of one power of two (below 2^53 of it; else VERIFY_INVALID). Heights are doubles, and so is what is
- * computed of them: a deviation counts less VERIFY_FREE_ROUNDING quanta, which is what rounding may make of a
+/* What is true of the triangles alone, and needs no window: vertices, triangles, t_junctions, overlaps and
+ * twice_area of the report; the rest of it is zeros. Memory: up to some 300 bytes per triangle. */
+verify_status verify_topology(const verify_triangle *triangles, size_t n, verify_report *report);
+
+/* verify_mesh for meshes whose vertices lie between samples, as clipping makes them. Places are doubles and taken
+ * at their word: turning, overlaps, T-junctions and which samples a triangle covers are exact, and need all places
+ * to be multiples of one power of two (below 2^53 of it; else VERIFY_INVALID). Heights are doubles, and so is what
+ * is computed of them: a deviation counts less VERIFY_FREE_ROUNDING quanta, which is what rounding may make of a
  * sample that lies on its plane. twice_area is rounded to whole cells, area is not. */
 typedef struct verify_free_corner {
     double col, row; /* sample coordinates, |col|, |row| < 2^21 */
@@ -99,6 +103,53 @@ typedef struct verify_free_triangle {
 /* As verify_mesh. Time: in step with the samples in all triangles and the cells along all edges. */
 verify_status verify_free_mesh(const verify_samples *samples, const verify_free_triangle *triangles, size_t n,
                                verify_report *report);
+/* ------------------------------------------------------------------------------------------------ views --
+ * How far a mesh is from the samples in a picture. Each valid sample S in a closed triangle has its place on it, M:
+ * the corners' places with the sample's weights among the corners. Where S or M is drawn, the distance of the two
+ * on the picture plane counts, which has no end; it is infinite when one of them is not before the eye. Points are
+ * drawn when their depth is above 0 and in near .. far, and they are inside the picture. Projection is plain double
+ * arithmetic of differences: a coplanar sample is off by 0 exactly where `rise` says how heights add up. */
+typedef struct verify_camera {
+    double eye[3];                      /* metres of the scene */
+    double forward[3], right[3], up[3]; /* unit, at right angles to each other */
+    double focal, width, height;        /* pixels, > 0: a point at depth z and x to the right is x * focal / z right
+                                           of the middle */
+    double near, far;                   /* 0 <= near < far; far may be infinite */
+} verify_camera;
+
+typedef struct verify_scene {
+    /* Where a sample or a corner is, metres. The same for the same corner. */
+    void (*place)(void *context, const verify_corner *corner, double xyz[3]);
+    /* Where places are linear in column, row and height: how much the third coordinate grows by a quantum, and the
+     * other two do not depend on heights. Else 0. */
+    double rise;
+    /* Asked of valid samples that are drawn and in no triangle: does the mesh have to cover this one, when its
+     * outline may be off by `slack` metres of the scene? NULL: never. */
+    bool (*is_promised)(void *context, int32_t col, int32_t row, double slack);
+    double slack; /* how far the outline may be off, pixels. In metres it is asked for as the radius of the largest
+                     ball about the sample no point of which is further than that from it in the picture */
+    void *context;
+} verify_scene;
+
+/* Windows are added up. Zeros, to begin with. */
+typedef struct verify_view_report {
+    uint64_t samples;   /* valid samples in a closed triangle, each counted once */
+    uint64_t drawn;     /* of them: S is drawn, or M is, on one triangle at least */
+    double max_pixels;  /* the largest distance; 0 when nothing is drawn */
+    double rms_pixels;  /* over the drawn samples, each with its largest distance */
+    double squares;     /* the sum of their squares */
+    uint64_t uncovered; /* promised samples that are drawn, and in no closed triangle */
+    /* Where max_pixels is: the first in row order of equal ones, if windows come in row order */
+    int32_t worst_col, worst_row;
+} verify_view_report;
+
+/* One window of samples (q, valid and where they are; the rest is not read) and all triangles of the mesh, which
+ * may reach over it. Windows must not overlap. Any other result than VERIFY_OK leaves the report as it was:
+ * VERIFY_INVALID for what verify_mesh refuses but corners outside the window, for a camera that is none, and a
+ * place that is not finite. Memory: 8 bytes per sample of the window. Time: in step with the window's samples, and
+ * the triangles. */
+verify_status verify_view(const verify_samples *samples, const verify_scene *scene, const verify_camera *camera,
+                          const verify_triangle *triangles, size_t n, verify_view_report *report);
 
 #ifdef __cplusplus
 }

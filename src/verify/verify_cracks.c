@@ -1,9 +1,10 @@
 /* verify_cracks.c - the corners of a mesh: how many there are, and where triangles that touch fail to share them.
  *
- * A corner is a lattice point of the window, so "is there a corner here" is one bit per sample, and a corner
- * strictly inside an edge can only be at the edge's lattice points, a whole number of steps (dx/g, dy/g) from its
- * end. Every edge of every triangle is walked; the walks of a triangle's edges visit fewer points than its samples,
- * so this never costs more than measuring the error, whatever the triangles are.
+ * A corner is a lattice point, so "is there a corner here" is a question to a hash table, and a corner strictly
+ * inside an edge can only be at the edge's lattice points, a whole number of steps (dx/g, dy/g) from its end. Every
+ * edge of every triangle is walked; the walks of a triangle's edges visit fewer points than its samples, so this
+ * never costs more than measuring the error, whatever the triangles are. Samples are not needed, but to say which
+ * corners are void.
  */
 #include "verify_internal.h"
 
@@ -20,10 +21,17 @@ typedef struct junction {
     size_t vertex, low, high;
 } junction;
 
+/* A place where there is a corner, and the height of the first one seen there. */
+typedef struct corner_place {
+    size_t after; /* the index in the window plus 1; 0: no place */
+    int32_t height;
+} corner_place;
+
 typedef struct crack_search {
     const verify_samples *samples;
-    uint64_t *is_corner;   /* a bit per sample */
-    int32_t *first_height; /* per sample: defined only where is_corner is set */
+    corner_place *places; /* a hash table, at most half full */
+    size_t place_count;
+    unsigned place_bits; /* log2 of its size */
     odd_height *odd;
     size_t odd_count, odd_room;
     junction *junctions;
@@ -31,8 +39,32 @@ typedef struct crack_search {
     bool junctions_capped;
 } crack_search;
 
+/* Where the place is in the table, or belongs. */
+static corner_place *find_place(corner_place *places, unsigned bits, size_t index) {
+    const size_t last = ((size_t)1 << bits) - 1;
+    size_t slot = (size_t)((index + 1) * UINT64_C(0x9E3779B97F4A7C15) >> (64 - bits)); /* Fibonacci hashing */
+    while (places[slot].after != 0 && places[slot].after != index + 1) slot = (slot + 1) & last;
+    return &places[slot];
+}
+
 static bool has_corner(const crack_search *search, size_t index) {
-    return (search->is_corner[index / 64] >> (index % 64) & 1) != 0;
+    return find_place(search->places, search->place_bits, index)->after != 0;
+}
+
+/* Room for one more place; false when there is no memory. */
+static bool make_place(crack_search *search) {
+    if (search->places != NULL && search->place_count < (size_t)1 << (search->place_bits - 1)) return true;
+    const unsigned bits = search->places != NULL ? search->place_bits + 1 : 10;
+    corner_place *places = calloc((size_t)1 << bits, sizeof *places);
+    if (places == NULL) return false;
+    for (size_t k = 0; search->places != NULL && k < (size_t)1 << search->place_bits; k++) {
+        const corner_place *old = &search->places[k];
+        if (old->after != 0) *find_place(places, bits, old->after - 1) = *old;
+    }
+    free(search->places);
+    search->places = places;
+    search->place_bits = bits;
+    return true;
 }
 
 /* Makes room for one more element in a malloced array; NULL, with the array untouched, when there is no memory. */
@@ -64,15 +96,17 @@ static int compare_junction(const void *left, const void *right) {
 
 static bool note_corner(crack_search *search, const verify_corner *corner, verify_report *report) {
     size_t index = verify_index(search->samples, corner->col, corner->row);
-    if (!has_corner(search, index)) {
-        search->is_corner[index / 64] |= UINT64_C(1) << (index % 64);
-        search->first_height[index] = corner->q;
+    if (!make_place(search)) return false;
+    corner_place *place = find_place(search->places, search->place_bits, index);
+    if (place->after == 0) {
+        *place = (corner_place){.after = index + 1, .height = corner->q};
+        search->place_count++;
         report->vertices++;
         const uint8_t *valid = search->samples->valid;
         if (valid != NULL && !valid[index]) report->void_touched++;
         return true;
     }
-    if (search->first_height[index] == corner->q) return true;
+    if (place->height == corner->q) return true;
     odd_height *odd = grow(search->odd, search->odd_count, &search->odd_room, sizeof *odd);
     if (odd == NULL) return false;
     search->odd = odd;
@@ -181,18 +215,10 @@ static verify_status search_cracks(crack_search *search, const verify_triangle *
 
 verify_status verify_measure_cracks(const verify_samples *samples, const verify_triangle *triangles, size_t n,
                                     verify_report *report) {
-    size_t count = (size_t)samples->width * (size_t)samples->height;
-    if (n == 0) return VERIFY_OK; /* and so below there is a corner in the window, and count > 0 */
-    if (count > SIZE_MAX / sizeof(int32_t)) return VERIFY_NO_MEMORY;
-    crack_search search = {.samples = samples,
-                           .is_corner = calloc(count / 64 + 1, sizeof(uint64_t)),
-                           .first_height = malloc(count * sizeof(int32_t))};
-    verify_status status = VERIFY_NO_MEMORY;
-    if (search.is_corner != NULL && search.first_height != NULL) {
-        status = search_cracks(&search, triangles, n, report);
-    }
-    free(search.is_corner);
-    free(search.first_height);
+    if (n == 0) return VERIFY_OK;
+    crack_search search = {.samples = samples};
+    const verify_status status = search_cracks(&search, triangles, n, report);
+    free(search.places);
     free(search.odd);
     free(search.junctions);
     return status;

@@ -1,20 +1,15 @@
 /* verify_error.c - how far the triangles' planes are from the samples, and which samples they cover.
  *
- * Every triangle is walked row by row. A row's samples in the closed triangle are an interval whose ends come from
- * integer division, so no sample on an edge is gained or lost by rounding. For a triangle with corner heights qa,
- * qb, qc and twice-area D, the plane through the corners times D is an integer at every sample; the deviation there
- * is the fraction |D * (q - qa) - slope * offset| / D, and the numerators are kept as integers until the very end.
+ * Every triangle is walked row by row (verify_raster.c). For a triangle with corner heights qa, qb, qc and
+ * twice-area D, the plane through the corners times D is an integer at every sample; the deviation there is the
+ * fraction |D * (q - qa) - slope * offset| / D, and the numerators are kept as integers until the very end.
  */
 #include "verify_internal.h"
 
 #include <math.h>
 #include <stdlib.h>
 
-enum {
-    MANTISSA_BITS = 53, /* of a double */
-    NARROW_BOX_LIMIT =
-        1 << 20 /* boxes with fewer cells than this keep all numerators in 64 bits, see measure_triangle */
-};
+enum { MANTISSA_BITS = 53 }; /* of a double */
 
 /* The largest deviation seen so far: numerator / denominator quanta, at an index of the window. */
 typedef struct worst_sample {
@@ -23,15 +18,6 @@ typedef struct worst_sample {
     size_t index;
 } worst_sample;
 
-/* A triangle turned so that it lies where (dx * (y - ay) - dy * (x - ax)) >= 0 for each of its edges. */
-typedef struct prepared_triangle {
-    verify_corner corner[3];
-    int64_t twice_area;       /* > 0 */
-    int64_t slope_x, slope_y; /* D times the plane's rise per column and per row; below 2^55 */
-    int64_t first_row, last_row;
-    bool narrow; /* 64 bits are enough */
-} prepared_triangle;
-
 typedef struct measurement {
     const verify_samples *samples;
     /* Per sample of the window its largest deviation in quanta; below zero when it is in no triangle. Doubles,
@@ -39,65 +25,6 @@ typedef struct measurement {
     double *deviation;
     worst_sample worst;
 } measurement;
-
-static int64_t floor_divide(int64_t a, int64_t b) { /* b > 0 */
-    int64_t quotient = a / b;
-    return quotient - (a % b < 0);
-}
-
-static int64_t least(int64_t a, int64_t b) {
-    return a < b ? a : b;
-}
-
-static int64_t most(int64_t a, int64_t b) {
-    return a > b ? a : b;
-}
-
-/* False for a triangle of no area: it has no plane, and covers nothing. */
-static bool prepare_triangle(const verify_triangle *triangle, prepared_triangle *p) {
-    p->corner[0] = triangle->corner[0];
-    p->corner[1] = triangle->corner[1];
-    p->corner[2] = triangle->corner[2];
-    p->twice_area = verify_cross(&p->corner[0], &p->corner[1], &p->corner[2]);
-    if (p->twice_area == 0) return false;
-    if (p->twice_area < 0) {
-        p->corner[1] = triangle->corner[2];
-        p->corner[2] = triangle->corner[1];
-        p->twice_area = -p->twice_area;
-    }
-    const verify_corner *a = &p->corner[0], *b = &p->corner[1], *c = &p->corner[2];
-    int64_t bx = (int64_t)b->col - a->col, by = (int64_t)b->row - a->row, bq = (int64_t)b->q - a->q;
-    int64_t cx = (int64_t)c->col - a->col, cy = (int64_t)c->row - a->row, cq = (int64_t)c->q - a->q;
-    p->slope_x = bq * cy - cq * by;
-    p->slope_y = cq * bx - bq * cx;
-    p->first_row = least(a->row, least(b->row, c->row));
-    p->last_row = most(a->row, most(b->row, c->row));
-    int64_t first_col = least(a->col, least(b->col, c->col));
-    int64_t last_col = most(a->col, most(b->col, c->col));
-    /* In a box of w by h cells D <= w * h, |slope_x| < 2^32 * h, |slope_y| < 2^32 * w, and an offset is at most w
-     * or h. So each product below is under 2^32 * w * h for a slope, and also for D * (q - qa), where q is any
-     * 32-bit number; a sum of three stays in 64 bits up to w * h = 2^29. The limit is far lower so that 128 bits
-     * are not a rarity that only a window of gigabytes, and no test, would ever see. */
-    p->narrow = (last_col - first_col) * (p->last_row - p->first_row) < NARROW_BOX_LIMIT;
-    return true;
-}
-
-/* The columns [*first, *last] of one row of the closed triangle; none when *first > *last. */
-static void row_interval(const prepared_triangle *p, int64_t row, int64_t *first, int64_t *last) {
-    *first = INT64_MIN;
-    *last = INT64_MAX;
-    for (int k = 0; k < 3; k++) {
-        const verify_corner *a = &p->corner[k], *b = &p->corner[k == 2 ? 0 : k + 1];
-        int64_t dx = (int64_t)b->col - a->col, dy = (int64_t)b->row - a->row;
-        int64_t reach = dx * (row - a->row);
-        if (dy > 0) {
-            *last = least(*last, a->col + floor_divide(reach, dy));
-        } else if (dy < 0) {
-            /* x - ax >= reach / dy, rounded up: the ceiling is minus the floor of the negated fraction. */
-            *first = most(*first, a->col - floor_divide(reach, -dy));
-        } /* a level edge bounds the rows, and the rows are already the triangle's */
-    }
-}
 
 static void offer_worst(worst_sample *worst, verify_uwide numerator, uint64_t denominator, size_t index) {
     if (worst->denominator != 0) {
@@ -111,7 +38,7 @@ static void offer_worst(worst_sample *worst, verify_uwide numerator, uint64_t de
 /* A row of a narrow triangle: `count` samples from `index` on, `plane` D times the plane's height over qa at the
  * first. The largest numerator so far and its place are updated; a later sample must be larger, so the first of
  * equals stays. */
-static void narrow_row(measurement *m, const prepared_triangle *p, size_t index, size_t count, int64_t plane,
+static void narrow_row(measurement *m, const verify_plane *p, size_t index, size_t count, int64_t plane,
                        int64_t *largest, size_t *place) {
     const int32_t *q = m->samples->q + index;
     const uint8_t *valid = m->samples->valid == NULL ? NULL : m->samples->valid + index;
@@ -135,7 +62,7 @@ static void narrow_row(measurement *m, const prepared_triangle *p, size_t index,
 }
 
 /* The same for a triangle too large for 64 bits. */
-static void wide_row(measurement *m, const prepared_triangle *p, size_t index, size_t count, verify_wide plane,
+static void wide_row(measurement *m, const verify_plane *p, size_t index, size_t count, verify_wide plane,
                      verify_wide *largest, size_t *place) {
     const int32_t *q = m->samples->q;
     const uint8_t *valid = m->samples->valid;
@@ -157,15 +84,15 @@ static void wide_row(measurement *m, const prepared_triangle *p, size_t index, s
 }
 
 static void measure_triangle(measurement *m, const verify_triangle *triangle) {
-    prepared_triangle p;
-    if (!prepare_triangle(triangle, &p)) return;
+    verify_plane p;
+    if (!verify_plane_of(triangle, &p)) return;
     const verify_corner *a = &p.corner[0];
     int64_t narrow_largest = -1;
     verify_wide wide_largest = -1;
     size_t place = 0;
     for (int64_t row = p.first_row; row <= p.last_row; row++) {
         int64_t first, last;
-        row_interval(&p, row, &first, &last);
+        verify_row_interval(&p, row, &first, &last);
         if (first > last) continue;
         size_t index = verify_index(m->samples, (int32_t)first, (int32_t)row);
         size_t count = (size_t)(last - first + 1);

@@ -29,6 +29,21 @@ static inline int64_t verify_cross(const verify_corner *a, const verify_corner *
 /* Is the window one that verify.h allows? */
 bool verify_samples_are_sound(const verify_samples *samples);
 
+/* A triangle turned so that it lies where (dx * (y - ay) - dy * (x - ax)) >= 0 for each of its edges. */
+typedef struct verify_plane {
+    verify_corner corner[3];
+    int64_t twice_area;       /* > 0 */
+    int64_t slope_x, slope_y; /* D times the plane's rise per column and per row; below 2^55 */
+    int64_t first_row, last_row;
+    bool narrow; /* 64 bits are enough */
+} verify_plane;
+
+/* False for a triangle of no area: it has no plane, and covers nothing. */
+bool verify_plane_of(const verify_triangle *triangle, verify_plane *p);
+/* The columns [*first, *last] of one of the triangle's rows, first_row .. last_row, that are in the closed
+ * triangle; none when *first > *last. */
+void verify_row_interval(const verify_plane *p, int64_t row, int64_t *first, int64_t *last);
+
 /* Fills samples, max_error, rms_error, worst_col, worst_row and uncovered. */
 verify_status verify_measure_error(const verify_samples *samples, const verify_triangle *triangles, size_t n,
                                    verify_report *report);

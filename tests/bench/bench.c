@@ -30,30 +30,9 @@ static int col0, row0;  /* of the window */
 static double box[4];   /* the window in CRS units: x0, y0, x1, y1 */
 static double whole[4]; /* the terrain */
 
-static void stop(const char *what, const char *why) {
-    fprintf(stderr, "bench: %s: %s\n", what, why);
-    exit(1);
-}
-
 /* ------------------------------------------------------------------------------------------------ SQLite -- */
-static sqlite3 *open_path(const char *path, bool writable) {
-    sqlite3 *db = NULL;
-    if (sqlite3_open_v2(path, &db, writable ? SQLITE_OPEN_READWRITE : SQLITE_OPEN_READONLY, NULL) != SQLITE_OK)
-        stop(path, sqlite3_errmsg(db));
-    char *why = NULL;
-    sqlite3_db_config(db, SQLITE_DBCONFIG_ENABLE_LOAD_EXTENSION, 1, NULL);
-    if (sqlite3_load_extension(db, extension_path, NULL, &why) != SQLITE_OK) stop(extension_path, why);
-    return db;
-}
-
 static sqlite3 *open_database(bool writable) {
-    return open_path(database_path, writable);
-}
-
-static sqlite3_stmt *prepare(sqlite3 *db, const char *sql) {
-    sqlite3_stmt *statement = NULL;
-    if (sqlite3_prepare_v2(db, sql, -1, &statement, NULL) != SQLITE_OK) stop(sql, sqlite3_errmsg(db));
-    return statement;
+    return bench_open(database_path, extension_path, writable);
 }
 
 /* ?1 .. ?4: the box, ?5: eps */
@@ -62,26 +41,14 @@ static void bind_window(sqlite3_stmt *statement, double eps) {
     sqlite3_bind_double(statement, 5, eps);
 }
 
-/* All rows; their number. The first row's first column may be a BLOB, whose size goes to *bytes. */
-static int64_t run(sqlite3_stmt *statement, int64_t *bytes) {
-    int64_t rows = 0;
-    int code;
-    while ((code = sqlite3_step(statement)) == SQLITE_ROW)
-        if (rows++ == 0 && bytes)
-            *bytes = sqlite3_column_blob(statement, 0) ? sqlite3_column_bytes(statement, 0) : 0;
-    if (code != SQLITE_DONE) stop(sqlite3_sql(statement), sqlite3_errmsg(sqlite3_db_handle(statement)));
-    sqlite3_reset(statement);
-    return rows;
-}
-
 static void find_window(void) {
     sqlite3 *db = open_database(false);
-    sqlite3_stmt *s = prepare(db, "SELECT width, height, x0, y0, dx, dy FROM rqt_terrains");
-    if (sqlite3_step(s) != SQLITE_ROW) stop(database_path, "no terrain");
+    sqlite3_stmt *s = bench_prepare(db, "SELECT width, height, x0, y0, dx, dy FROM rqt_terrains");
+    if (sqlite3_step(s) != SQLITE_ROW) bench_stop(database_path, "no terrain");
     const int width = sqlite3_column_int(s, 0), height = sqlite3_column_int(s, 1);
     const double x0 = sqlite3_column_double(s, 2), y0 = sqlite3_column_double(s, 3),
                  dx = sqlite3_column_double(s, 4), dy = sqlite3_column_double(s, 5);
-    if (width <= WINDOW || height <= WINDOW) stop(database_path, "the terrain is smaller than the window");
+    if (width <= WINDOW || height <= WINDOW) bench_stop(database_path, "the terrain is smaller than the window");
     col0 = (width - WINDOW) / 2;
     row0 = (height - WINDOW) / 2;
     const double corners[] = {x0 + col0 * dx, y0 + (row0 + WINDOW) * dy, x0 + (col0 + WINDOW) * dx, y0 + row0 * dy};
@@ -98,11 +65,11 @@ static void read_window(bench_times *read, bench_times *open_and_read) {
     static int16_t heights[(WINDOW + 1) * (WINDOW + 1)];
     const double begin = bench_now();
     GDALDatasetH raster = GDALOpen(raster_path, GA_ReadOnly);
-    if (!raster) stop(raster_path, "GDAL cannot open it");
+    if (!raster) bench_stop(raster_path, "GDAL cannot open it");
     const double opened = bench_now();
     if (GDALRasterIO(GDALGetRasterBand(raster, 1), GF_Read, col0, row0, WINDOW + 1, WINDOW + 1, heights, WINDOW + 1,
                      WINDOW + 1, GDT_Int16, 0, 0) != CE_None)
-        stop(raster_path, "GDAL cannot read it");
+        bench_stop(raster_path, "GDAL cannot read it");
     const double end = bench_now();
     GDALClose(raster);
     bench_add(read, end - opened);
@@ -115,9 +82,9 @@ static void ask_fresh(double eps, bench_times *opening, bench_times *query) {
     const double begin = bench_now();
     sqlite3 *db = open_database(false);
     const double opened = bench_now();
-    sqlite3_stmt *s = prepare(db, STRIP);
+    sqlite3_stmt *s = bench_prepare(db, STRIP);
     bind_window(s, eps);
-    run(s, NULL);
+    bench_run(s, NULL);
     bench_add(query, bench_now() - opened);
     bench_add(opening, opened - begin);
     sqlite3_finalize(s);
@@ -125,9 +92,9 @@ static void ask_fresh(double eps, bench_times *opening, bench_times *query) {
 }
 
 static double single(sqlite3 *db, const char *sql, double eps) {
-    sqlite3_stmt *s = prepare(db, sql);
+    sqlite3_stmt *s = bench_prepare(db, sql);
     bind_window(s, eps);
-    if (sqlite3_step(s) != SQLITE_ROW) stop(sql, sqlite3_errmsg(db));
+    if (sqlite3_step(s) != SQLITE_ROW) bench_stop(sql, sqlite3_errmsg(db));
     const double value = sqlite3_column_double(s, 0);
     sqlite3_finalize(s);
     return value;
@@ -139,17 +106,17 @@ static void bench_window(bench_table *table) {
     sqlite3_stmt *s[EPS_COUNT];
     int64_t bytes[EPS_COUNT];
     for (int e = 0; e < EPS_COUNT; e++) {
-        s[e] = prepare(db, STRIP);
+        s[e] = bench_prepare(db, STRIP);
         bind_window(s[e], EPS[e]);
-        run(s[e], &bytes[e]);
+        bench_run(s[e], &bytes[e]);
     }
     for (int burst = 0; burst < BURSTS; burst++) {
         for (int i = 0; i < BURST; i++) read_window(&gdal, &gdal_open);
         for (int e = 0; e < EPS_COUNT; e++) {
-            run(s[e], NULL); /* the others have had the processor's caches */
+            bench_run(s[e], NULL); /* the others have had the processor's caches */
             for (int i = 0; i < BURST; i++) {
                 const double begin = bench_now();
-                run(s[e], NULL);
+                bench_run(s[e], NULL);
                 bench_add(&warm[e], bench_now() - begin);
             }
         }
@@ -202,11 +169,11 @@ enum { OVERVIEW_TRIANGLES = 10000 };
 /* The eps of the whole terrain's mesh of about so many triangles: halving. */
 static double overview_eps(sqlite3 *db) {
     double low = 1, high = 4000;
-    sqlite3_stmt *s = prepare(db, "SELECT count(*) FROM rqt_triangles(NULL, ?1)");
+    sqlite3_stmt *s = bench_prepare(db, "SELECT count(*) FROM rqt_triangles(NULL, ?1)");
     for (int i = 0; i < 12; i++) {
         const double middle = (low + high) / 2;
         sqlite3_bind_double(s, 1, middle);
-        if (sqlite3_step(s) != SQLITE_ROW) stop("overview", sqlite3_errmsg(db));
+        if (sqlite3_step(s) != SQLITE_ROW) bench_stop("overview", sqlite3_errmsg(db));
         *(sqlite3_column_int64(s, 0) > OVERVIEW_TRIANGLES ? &low : &high) = middle;
         sqlite3_reset(s);
     }
@@ -216,20 +183,20 @@ static double overview_eps(sqlite3 *db) {
 
 static void bench_large(bench_table *table, const char *large_path) {
     static bench_times small[EPS_COUNT], large[EPS_COUNT], overview;
-    sqlite3 *db[2] = {open_database(false), open_path(large_path, false)};
+    sqlite3 *db[2] = {open_database(false), bench_open(large_path, extension_path, false)};
     bench_table_section(table, "large", "The same window out of a database 32 times as large", "of small");
     for (int e = 0; e < EPS_COUNT; e++) {
         sqlite3_stmt *s[2];
         for (int d = 0; d < 2; d++) {
-            s[d] = prepare(db[d], STRIP);
+            s[d] = bench_prepare(db[d], STRIP);
             bind_window(s[d], EPS[e]);
         }
         for (int burst = 0; burst < BURSTS; burst++)
             for (int d = 0; d < 2; d++) {
-                run(s[d], NULL);
+                bench_run(s[d], NULL);
                 for (int i = 0; i < BURST; i++) {
                     const double begin = bench_now();
-                    run(s[d], NULL);
+                    bench_run(s[d], NULL);
                     bench_add(d ? &large[e] : &small[e], bench_now() - begin);
                 }
             }
@@ -243,12 +210,12 @@ static void bench_large(bench_table *table, const char *large_path) {
                         (bench_aim){BENCH_AT_MOST, 1.3});
     }
     const double eps = overview_eps(db[1]);
-    sqlite3_stmt *s = prepare(db[1], "SELECT rqt_mesh(NULL, ?1, 'strip')");
+    sqlite3_stmt *s = bench_prepare(db[1], "SELECT rqt_mesh(NULL, ?1, 'strip')");
     sqlite3_bind_double(s, 1, eps);
-    run(s, NULL);
+    bench_run(s, NULL);
     for (int i = 0; i < BURSTS * BURST; i++) {
         const double begin = bench_now();
-        run(s, NULL);
+        bench_run(s, NULL);
         bench_add(&overview, bench_now() - begin);
     }
     sqlite3_finalize(s);
@@ -267,7 +234,7 @@ static double database_bytes, cog_bytes, samples;
 
 static void read_times(const char *path) {
     FILE *in = fopen(path, "r");
-    if (!in) stop(path, "cannot be read");
+    if (!in) bench_stop(path, "cannot be read");
     char what[32];
     double value;
     while (fscanf(in, "%31s %lf", what, &value) == 2) {
@@ -283,7 +250,7 @@ static void read_times(const char *path) {
         if (!strcmp(what, "samples")) samples = value;
     }
     fclose(in);
-    if (!imports.runs || !cog.runs || !(cog_bytes > 0)) stop(path, "times are missing");
+    if (!imports.runs || !cog.runs || !(cog_bytes > 0)) bench_stop(path, "times are missing");
 }
 
 static void show_import(bench_table *table) {
@@ -390,9 +357,9 @@ static const sqlite3_module EMPTY = {.xConnect = empty_connect,
 /* Steps through all rows; all of it to *total, what follows the first row to *stepping. */
 static void step_rows(sqlite3_stmt *s, bench_times *total, bench_times *stepping) {
     const double begin = bench_now();
-    if (sqlite3_step(s) != SQLITE_ROW) stop(sqlite3_sql(s), sqlite3_errmsg(sqlite3_db_handle(s)));
+    if (sqlite3_step(s) != SQLITE_ROW) bench_stop(sqlite3_sql(s), sqlite3_errmsg(sqlite3_db_handle(s)));
     const double first = bench_now();
-    run(s, NULL);
+    bench_run(s, NULL);
     const double end = bench_now();
     bench_add(total, end - begin);
     bench_add(stepping, end - first);
@@ -402,11 +369,11 @@ static void bench_rows(bench_table *table) {
     static bench_times range, range_steps, empty, empty_steps;
     sqlite3 *db = open_database(false);
     if (sqlite3_create_module(db, "bench_empty", &EMPTY, NULL) != SQLITE_OK)
-        stop("bench_empty", sqlite3_errmsg(db));
-    sqlite3_stmt *asked = prepare(db, "SELECT * FROM rqt_range(rqt_bbox(?1, ?2, ?3, ?4), ?5)");
-    sqlite3_stmt *given = prepare(db, "SELECT * FROM bench_empty(?1)");
+        bench_stop("bench_empty", sqlite3_errmsg(db));
+    sqlite3_stmt *asked = bench_prepare(db, "SELECT * FROM rqt_range(rqt_bbox(?1, ?2, ?3, ?4), ?5)");
+    sqlite3_stmt *given = bench_prepare(db, "SELECT * FROM bench_empty(?1)");
     bind_window(asked, 1);
-    const int64_t rows = run(asked, NULL);
+    const int64_t rows = bench_run(asked, NULL);
     sqlite3_bind_int64(given, 1, rows);
     for (int burst = 0; burst < BURSTS; burst++) {
         step_rows(asked, &range, &range_steps);
@@ -440,18 +407,18 @@ static void make_places(void) {
     char *why = NULL;
     if (sqlite3_exec(db, "BEGIN; DROP TABLE IF EXISTS bench_place; CREATE TABLE bench_place(x, y, wx, wy)", NULL,
                      NULL, &why))
-        stop("bench_place", why);
-    sqlite3_stmt *s = prepare(db, "INSERT INTO bench_place VALUES(?1, ?2, ?3, ?4)");
+        bench_stop("bench_place", why);
+    sqlite3_stmt *s = bench_prepare(db, "INSERT INTO bench_place VALUES(?1, ?2, ?3, ?4)");
     uint64_t state = 1;
     for (int i = 0; i < PLACES; i++) {
         for (int c = 0; c < 4; c++) {
             const double *in = c < 2 ? whole : box;
             sqlite3_bind_double(s, c + 1, in[c % 2] + uniform(&state) * (in[c % 2 + 2] - in[c % 2]));
         }
-        run(s, NULL);
+        bench_run(s, NULL);
     }
     sqlite3_finalize(s);
-    if (sqlite3_exec(db, "COMMIT", NULL, NULL, &why)) stop("bench_place", why);
+    if (sqlite3_exec(db, "COMMIT", NULL, NULL, &why)) bench_stop("bench_place", why);
     sqlite3_close(db);
 }
 
@@ -466,11 +433,11 @@ static void bench_heights(bench_table *table) {
     static bench_times times[ASKS];
     sqlite3 *db = open_database(false);
     for (int a = 0; a < ASKS; a++) {
-        sqlite3_stmt *s = prepare(db, asks[a].sql);
-        run(s, NULL);
+        sqlite3_stmt *s = bench_prepare(db, asks[a].sql);
+        bench_run(s, NULL);
         for (int i = 0; i < BURST; i++) {
             const double begin = bench_now();
-            run(s, NULL);
+            bench_run(s, NULL);
             bench_add(&times[a], bench_now() - begin);
         }
         sqlite3_finalize(s);
@@ -491,7 +458,7 @@ int main(int argc, char **argv) {
     extension_path = argv[2];
     raster_path = argv[3];
     bench_table table;
-    if (!bench_table_open(&table, argv[5], argv[6], argv[7])) stop(argv[5], "cannot be written");
+    if (!bench_table_open(&table, argv[5], argv[6], argv[7])) bench_stop(argv[5], "cannot be written");
     setvbuf(stdout, NULL, _IOLBF, 0);
     printf("Machine: %s\nData: %s\nMedians; a ratio is of medians.\n", argv[6], argv[7]);
     GDALAllRegister();
@@ -505,6 +472,6 @@ int main(int argc, char **argv) {
     bench_options(&table, db, box, whole);
     sqlite3_close(db);
     if (argc == 9) bench_large(&table, argv[8]);
-    if (!bench_table_close(&table)) stop(argv[5], "cannot be written");
+    if (!bench_table_close(&table)) bench_stop(argv[5], "cannot be written");
     return 0;
 }

@@ -1,11 +1,12 @@
-/* bench.h - times, their medians, and the table that shows them. */
+/* bench.h - times, their medians, the table that shows them, and SQL that stops the bench where it fails. */
 #ifndef RQT_BENCH_H
 #define RQT_BENCH_H
 
 #include <stdbool.h>
+#include <stdint.h>
 #include <stdio.h>
 
-enum { BENCH_MOST_RUNS = 256 };
+enum { BENCH_MOST_RUNS = 1024 };
 
 /* What one thing took, run by run. */
 typedef struct bench_times {
@@ -18,7 +19,8 @@ typedef struct bench_summary {
     double median, low, high;
 } bench_summary;
 
-double bench_now(void); /* seconds */
+/* Seconds; of the processor where the environment has BENCH_CPU: for a machine that others use, too. */
+double bench_now(void);
 void bench_add(bench_times *times, double value);
 bench_summary bench_summarise(const bench_times *times);
 
@@ -49,8 +51,19 @@ void bench_table_count(bench_table *table, const char *what, double value, const
 /* false: the CSV file is not whole. */
 bool bench_table_close(bench_table *table);
 
-/* Rows of section "options": db may be written; boxes are x0, y0, x1, y1 in its coordinates. bench_options.c */
+/* ---------------------------------------------------------------------------------------- SQL: bench_sql.c -- */
 struct sqlite3;
+struct sqlite3_stmt;
+/* Says both on standard error, and ends the program. */
+_Noreturn void bench_stop(const char *what, const char *why);
+/* A new connection with the extension; the caller closes it. */
+struct sqlite3 *bench_open(const char *path, const char *extension, bool writable);
+struct sqlite3_stmt *bench_prepare(struct sqlite3 *db, const char *sql);
+/* All rows; their number. The statement is reset. The first row's first column may be a BLOB, whose size goes to
+ * *bytes (may be NULL). */
+int64_t bench_run(struct sqlite3_stmt *statement, int64_t *bytes);
+
+/* Rows of section "options": db may be written; boxes are x0, y0, x1, y1 in its coordinates. bench_options.c */
 void bench_options(bench_table *table, struct sqlite3 *db, const double box[4], const double whole[4]);
 
 #endif

@@ -5,6 +5,7 @@
 # terrain and the programs stay in build/bench for the next time, with the figures in bench.csv.
 #   BENCH_K=12      2^K + 1 samples a side
 #   BENCH_RUNS=5    of whole programs
+#   BENCH_CPU=1     processor time in place of the clock's, but of whole programs
 #   BENCH_LARGE=5   imports of 32769 x 16385 samples with --memory 256; 0: leave the large database out (it takes minutes
 #                   and 2 GB of disk)
 set -euo pipefail
@@ -16,37 +17,18 @@ K=${BENCH_K:-12}
 RUNS=${BENCH_RUNS:-5}
 LARGE=${BENCH_LARGE:-5}
 OUT=$BUILD/bench
-side=$(((1 << K) + 1))
-raster=$OUT/fbm_$side.bin
-tiff=$OUT/fbm_$side.tif
 mkdir -p "$OUT"
 
 for needed in "$RQT" "$RQT_SO"; do
     [[ -e $needed ]] || { echo "bench: $needed is missing; run make first" >&2; exit 2; }
 done
 
-compile() { # OUTPUT FLAGS SOURCES...
-    local output=$1 flags=$2 s
-    shift 2
-    for s in "$@" tests/bench/bench.h; do
-        if [[ ! -e $output || $s -nt $output ]]; then
-            # shellcheck disable=SC2086
-            gcc -std=gnu11 -O3 -ffp-contract=off -Wall -Wextra -Wconversion -Wshadow -Werror "$@" -o "$output" $flags
-            return
-        fi
-    done
-}
-compile "$OUT/make_terrain" "" tests/bench/make_terrain.c
+# shellcheck source=tests/bench/common.sh
+source tests/bench/common.sh
 compile "$OUT/mirror_terrain" "" tests/bench/mirror_terrain.c
 compile "$OUT/bench" "$(gdal-config --cflags) -lsqlite3 $(gdal-config --libs) -lm" \
-    tests/bench/bench.c tests/bench/bench_options.c tests/bench/bench_table.c
-
-if [[ ! -e $raster || $OUT/make_terrain -nt $raster ]]; then
-    echo "Generating $side x $side samples ..." >&2
-    "$OUT/make_terrain" "$K" "$raster"
-    rm -f "$tiff"
-fi
-[[ -e $tiff ]] || gdal_translate -q -co TILED=YES -co COMPRESS=ZSTD -co PREDICTOR=2 "$raster" "$tiff"
+    tests/bench/bench.c tests/bench/bench_options.c tests/bench/bench_sql.c tests/bench/bench_table.c
+generate_tiff "$K"
 
 times=$OUT/times.txt
 echo "samples $((side * side))" >"$times"
@@ -93,9 +75,8 @@ if ((LARGE > 0 && K == 12)); then
     large=("$OUT/large.gpkg")
 fi
 
-machine="$(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo | head -n 1), $(nproc) cores"
 data="generated fBm (H 0.9, seed 1), $side x $side int16, 30 m cells, 0 to 4000 m"
-"$OUT/bench" "$OUT/fbm.gpkg" "$RQT_SO" "$tiff" "$times" "$OUT/bench.csv" "$machine" "$data" "${large[@]}"
+"$OUT/bench" "$OUT/fbm.gpkg" "$RQT_SO" "$tiff" "$times" "$OUT/bench.csv" "$(machine_name)" "$data" "${large[@]}"
 if [[ -e $BUILD/librqt.a ]]; then
     core() { # NAME LIBRARIES: a program on librqt.a alone
         [[ ! $BUILD/librqt.a -nt $OUT/$1 ]] || rm -f "$OUT/$1"

@@ -10,11 +10,6 @@
 
 enum { TURNS = 15, ROADS = 5000, ROAD_POINTS = 20, CORNERS = 256 };
 
-static void stop(const char *what, sqlite3 *db) {
-    fprintf(stderr, "bench: %s: %s\n", what, sqlite3_errmsg(db));
-    exit(1);
-}
-
 /* A table of short roads all over the terrain, with half a metre each. */
 static void make_roads(sqlite3 *db, const double whole[4]) {
     sqlite3_stmt *s;
@@ -22,7 +17,7 @@ static void make_roads(sqlite3 *db, const double whole[4]) {
     if (sqlite3_exec(db, "BEGIN; DROP TABLE IF EXISTS bench_road; CREATE TABLE bench_road(geom, eps)", NULL, NULL,
                      NULL) != SQLITE_OK ||
         sqlite3_prepare_v2(db, "INSERT INTO bench_road VALUES(?1, 0.5)", -1, &s, NULL) != SQLITE_OK)
-        stop("bench_road", db);
+        bench_stop("bench_road", sqlite3_errmsg(db));
     for (int road = 0; road < ROADS; road++) {
         char text[ROAD_POINTS * 48 + 16];
         size_t n = (size_t)snprintf(text, sizeof text, "LINESTRING(");
@@ -40,11 +35,11 @@ static void make_roads(sqlite3 *db, const double whole[4]) {
                                   at[1] + i * step[1] + (i % 3) * step[0] / 2);
         snprintf(text + n, sizeof text - n, ")");
         sqlite3_bind_text(s, 1, text, -1, SQLITE_TRANSIENT);
-        if (sqlite3_step(s) != SQLITE_DONE) stop("bench_road", db);
+        if (sqlite3_step(s) != SQLITE_DONE) bench_stop("bench_road", sqlite3_errmsg(db));
         sqlite3_reset(s);
     }
     sqlite3_finalize(s);
-    if (sqlite3_exec(db, "COMMIT", NULL, NULL, NULL) != SQLITE_OK) stop("bench_road", db);
+    if (sqlite3_exec(db, "COMMIT", NULL, NULL, NULL) != SQLITE_OK) bench_stop("bench_road", sqlite3_errmsg(db));
 }
 
 typedef struct question {
@@ -56,7 +51,7 @@ typedef struct question {
 
 static void ask(sqlite3 *db, sqlite3_stmt *s, bench_times *times) {
     const double begin = bench_now();
-    if (sqlite3_step(s) != SQLITE_ROW) stop(sqlite3_sql(s), db);
+    if (sqlite3_step(s) != SQLITE_ROW) bench_stop(sqlite3_sql(s), sqlite3_errmsg(db));
     sqlite3_reset(s);
     if (times) bench_add(times, bench_now() - begin);
 }
@@ -94,7 +89,7 @@ void bench_options(bench_table *table, sqlite3 *db, const double box[4], const d
     sqlite3_stmt *s[QUESTIONS];
     for (int q = 0; q < QUESTIONS; q++) {
         const question *o = &questions[q];
-        if (sqlite3_prepare_v2(db, o->sql, -1, &s[q], NULL) != SQLITE_OK) stop(o->sql, db);
+        s[q] = bench_prepare(db, o->sql);
         sqlite3_bind_text(s[q], 1, o->region, -1, SQLITE_STATIC);
         sqlite3_bind_double(s[q], 2, o->eps);
         sqlite3_bind_text(s[q], 3, o->options, -1, SQLITE_STATIC);

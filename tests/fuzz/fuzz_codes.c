@@ -34,6 +34,14 @@ static void numbers_of_a_lattice(input *in) {
         for (int p = 0; p < n; p++) found |= back[p].x == v.x && back[p].y == v.y;
         HOLD(found, "(%d,%d) is no parent of its child", v.x, v.y);
     }
+    rqt_vertex end[2];
+    const int ends = rqt_vertex_ends(&l, v, end);
+    HOLD(ends == (scale < l.K ? 2 : 0), "%d ends", ends);
+    for (int e = 0; e < ends; e++)
+        HOLD(end[e].x >= 0 && end[e].y >= 0 && end[e].x <= side && end[e].y <= side &&
+                 rqt_vertex_scale(&l, end[e]) > scale && end[0].x + end[1].x == 2 * v.x &&
+                 end[0].y + end[1].y == 2 * v.y,
+             "an end of (%d,%d)", v.x, v.y);
     const rqt_vertex s = rqt_vertex_clamp(&l, v);
     HOLD(s.x >= 0 && s.x < width && s.y >= 0 && s.y < height, "(%d,%d) is no sample", s.x, s.y);
 

@@ -47,6 +47,23 @@ static bool take_camera(input *in, rqt_camera *c) {
     return false;
 }
 
+/* In the band of any camera numbers are numbers, and nothing is allowed that the camera itself is not. */
+static void in_band(input *in, const rqt_camera *camera, const rqt_prism *prism, const rqt_view_bound *alone,
+                    bool sound) {
+    const double nearest = fabs(take_double(in));
+    const rqt_view_band band = rqt_camera_band(camera, isfinite(nearest) ? nearest : 0);
+    rqt_view_bound b;
+    rqt_view_tolerance_in_band(camera, &band, prism, &b);
+    HOLD(b.eps >= 0 && isfinite(b.eps) && b.share >= 0 && b.share <= 1, "eps %g, share %g", b.eps, b.share);
+    (void)rqt_camera_widen(camera, &band);
+    if (!sound) return;
+    HOLD(band.move > 0 && band.turn > 0 && rqt_camera_holds(camera, &band, camera), "move %g, turn %g", band.move,
+         band.turn);
+    if (prism->radius >= 0)
+        HOLD(b.eps <= alone->eps * (1 + 1e-9) || !(alone->eps > 1e-300), "eps %g, alone %g", b.eps, alone->eps);
+    if (prism->radius >= 0) HOLD(b.shown || !alone->shown || alone->eps == 0, "not shown in the band, but alone");
+}
+
 const long fuzz_runs = 40000;
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
@@ -73,6 +90,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     HOLD(b.eps >= 0 && isfinite(b.eps), "eps %g", b.eps);
     HOLD(b.distance >= 0 && isfinite(b.distance), "distance %g", b.distance);
     HOLD(b.share >= 0 && b.share <= 1, "share %g", b.share);
+    in_band(&in, &camera, &prism, &b, sound && length > 0 && prism.upright <= 1);
     /* The piece's middle, and what is eps above it. */
     if (!sound || !(prism.radius >= 0) || !(length > 0) || !(prism.upright <= 1)) return 0;
     bool drawn = rqt_camera_project(&camera, prism.centre, xy);

@@ -100,11 +100,13 @@ SELECT * FROM rqt_range(NULL, 1, NULL, '{"max_vertices":4.5}');
 SELECT * FROM rqt_range(NULL, 1, NULL, '{"max_vertices":"5"}');
 --! rqt_range(): option "max_vertices" must be an integer of 4 or more
 
--- of the contract, not yet here
+-- of views
 SELECT * FROM rqt_triangles(NULL, 1, NULL, '{"max_triangles":100}');
---! rqt_triangles(): option "max_triangles" is not in this version
+--! rqt_triangles(): option "max_triangles" is for views
 SELECT * FROM rqt_range(NULL, 1, NULL, '{"previous":"x"}');
---! rqt_range(): option "previous" is not in this version
+--! rqt_range(): option "previous" is for views
+SELECT * FROM rqt_range(NULL, 1, NULL, '{"max_triangles":0}');
+--! rqt_range(): option "max_triangles" must be an integer of 1 or more
 SELECT * FROM rqt_verify(NULL, 1, NULL, '{"test":{}}');
 --! rqt_verify(): option "test" must be a text: one of guaranteed ulrich node sphere lindstrom lodmap
 

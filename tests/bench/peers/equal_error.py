@@ -15,21 +15,26 @@ ERRORS = [2, 5, 10, 20, 50]
 OTHERS = ["minimal", "wedgie", "local", "euclid", "greedy TIN (delatin)", "RTIN (martini)"]
 
 
-def read_front(rows, series):
-    meshes = sorted((int(r["vertices"]), float(r["max_error"])) for r in rows if r["series"] == series)
+def pareto_front(meshes):
+    """Of (size, error), sorted: those that no other is as small as with less error."""
     front = []
-    for vertices, error in meshes:
+    for size, error in meshes:
         if error > 0 and (not front or error < front[-1][1]):
-            front.append((vertices, error))
+            front.append((size, error))
     return front
 
 
-def vertices_at(front, error):
+def value_at(front, error):
+    """The size that a front has at an error; None outside it."""
     for (v0, e0), (v1, e1) in zip(front, front[1:]):
         if e1 <= error <= e0:
             t = (math.log(e0) - math.log(error)) / (math.log(e0) - math.log(e1))
             return math.exp(math.log(v0) + t * (math.log(v1) - math.log(v0)))
     return None
+
+
+def read_front(rows, series):
+    return pareto_front(sorted((int(r["vertices"]), float(r["max_error"])) for r in rows if r["series"] == series))
 
 
 def main():
@@ -45,12 +50,12 @@ def main():
     for name, rows in all_rows.items():
         fronts = {o: read_front(rows, o) for o in ["exact"] + present}
         for error in ERRORS:
-            exact = vertices_at(fronts["exact"], error)
+            exact = value_at(fronts["exact"], error)
             if exact is None:
                 continue
             cells = []
             for other in present:
-                peer = vertices_at(fronts[other], error)
+                peer = value_at(fronts[other], error)
                 cells.append(f"{exact / peer:.2f}" if peer else "")
                 if peer:
                     ratios[other].append(exact / peer)
@@ -59,4 +64,5 @@ def main():
     print("| median of all | | | " + " | ".join(cells) + " |")
 
 
-main()
+if __name__ == "__main__":
+    main()
