@@ -33,6 +33,16 @@ class Answer:
         return problem["detail"] if problem["status"] == self.status else "problem of %s" % problem["status"]
 
 
+class Nothing(Answer):
+    """Instead of an answer, where none came."""
+
+    def __init__(self):
+        self.status, self.body, self.headers = 0, b"", {}
+
+    def json(self):
+        return {}
+
+
 class Service:
     def __init__(self, *arguments, **environment):
         self.log = open(s.temp("serve.log"), "w+")
@@ -50,16 +60,16 @@ class Service:
         if parameters:
             path += "?" + urllib.parse.urlencode(parameters)
         mine = connection or self.connection or self.connect()
-        try:
-            mine.request(method, path, body=body, headers=headers or {})
-            response = mine.getresponse()
-            answer = Answer(response, response.read())
-        except (http.client.HTTPException, ConnectionError):
-            mine.close()
-            raise
         if not connection:
             self.connection = mine
-        return answer
+        for _ in range(2):  # a connection that was kept may have been closed meanwhile
+            try:
+                mine.request(method, path, body=body, headers=headers or {})
+                response = mine.getresponse()
+                return Answer(response, response.read())
+            except (http.client.HTTPException, ConnectionResetError, BrokenPipeError):
+                mine.close()
+        return Nothing()
 
     def is_alive(self):
         return self.process.poll() is None
