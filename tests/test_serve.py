@@ -500,6 +500,8 @@ for what, harm in (("a block", "block"), ("pages", "pages"), ("text", "text"), (
         equal("an empty file has no terrain", answer.status, 404)
     else:
         check("damage to %s: 500 with a sentence" % what, answer.status == 500 and len(answer.detail()) > 10 and "no problem" not in answer.detail(), (answer.status, answer.body[:300]))
+        answer = ask("/collections")
+        check("and /collections says so, where there is no other (%s)" % what, answer.status in (200, 500) and (answer.status == 200 or len(answer.detail()) > 10), (answer.status, answer.body[-200:]))
     equal("the service lives (%s)" % what, (ask("/healthz").status, ask("/").status), (200, 200))
 shutil.copy(pristine, s.temp("next.gpkg"))
 os.rename(s.temp("next.gpkg"), one)

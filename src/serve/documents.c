@@ -174,8 +174,7 @@ static bool add_terrains(database *d, request *r, cJSON *collections) {
 /* What is wrong with a database, instead of its terrains. */
 static void add_problem(const database *d, request *r, cJSON *problems) {
     buffer *b = &r->answer.body;
-    buffer_add(b, "", 1);
-    cJSON *told = b->bytes ? cJSON_Parse(b->bytes) : NULL;
+    cJSON *told = b->bytes ? cJSON_ParseWithLength(b->bytes, b->size) : NULL;
     cJSON *problem = cJSON_CreateObject();
     cJSON_AddStringToObject(problem, "database", database_label(d));
     cJSON_AddItemToObject(problem, "detail", cJSON_DetachItemFromObject(told, "detail"));
