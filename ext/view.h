@@ -86,7 +86,7 @@ struct view {
     rqt_view_test test;
     rqt_field *field;
     double achieved_tau; /* pixels: camera.tau, or more to keep within max_triangles */
-    bool guaranteed;     /* the tolerance holds for the source's samples, too; view_field sets it */
+    bool guaranteed;     /* no sample that is drawn, its height as kept, is off by more than achieved_tau */
     /* Of option previous; follow.c. */
     bool has_band;
     rqt_view_band band; /* the answer is right for all cameras of it */

@@ -36,11 +36,9 @@ typedef struct builder {
     const store_terrain *terrain;
     store_relief relief[RQT_MAX_K + 1]; /* of the square at hand and of those around it, by level */
     square_list shown;
-    bool
-        finer_than_stored; /* somewhere in it the tolerance is below what rounding took from the source's heights */
-    uint32_t asked;        /* squares */
-    rqt_camera cutting;    /* the camera that says which squares are cut */
-    double nearest;        /* so far */
+    uint32_t asked;     /* squares */
+    rqt_camera cutting; /* the camera that says which squares are cut */
+    double nearest;     /* so far */
     int code;
     char **error;
 } builder;
@@ -199,7 +197,6 @@ static rqt_field_step decide(void *context, rqt_square square, double *eps) {
             rqt_view_test_bound(v->test, &coarse, &piece, &bound);
     }
     *eps = bound.eps / v->scene.exaggeration;
-    b->finer_than_stored |= shown && *eps < b->terrain->quantum_error;
     if (!shown || add_square(&b->shown, grow_square(square, &piece, bound.distance, &b->terrain->lattice)))
         return RQT_FIELD_LEAF;
     b->code = SQLITE_NOMEM;
@@ -218,7 +215,7 @@ int view_field(request *r, char **error) {
     rqt_field_free(v->field);
     const rqt_status status = rqt_field_create(&r->terrain->lattice, store_allocator(), decide, &b, &v->field);
     int code = ended(&b, status, error);
-    v->guaranteed = v->test == RQT_VIEW_GUARANTEED && !b.finer_than_stored;
+    v->guaranteed = v->test == RQT_VIEW_GUARANTEED;
     if (code == SQLITE_OK) code = region_of(&b.shown, r->terrain, &r->region);
     sqlite3_free(b.shown.items);
     return code;

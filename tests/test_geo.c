@@ -37,6 +37,8 @@ static double dice(double low, double high) {
     return low + (high - low) * ((double)(dice_state >> 11) * 0x1p-53);
 }
 
+static const geo_ellipsoid wgs84 = {6378137.0, 1 / 298.257223563};
+
 static void start_dice(uint64_t seed) {
     const char *given = getenv("RQT_SEED");
     dice_state = given ? strtoull(given, NULL, 10) : seed;
@@ -411,7 +413,6 @@ static void ellipsoids_are_read_out_of_wkt(void **state) {
 static void planimetric_areas_are_those_of_geodesic_polygons(void **state) {
     (void)state;
     start_dice(14);
-    const geo_ellipsoid wgs84 = GEO_WGS84;
     for (int n = 0; n < 30; n++) {
         double c[3][3];
         const double size = n % 3 == 0 ? 0.001 : n % 3 == 1 ? 1 : 20, lon = dice(-180, 180), lat = dice(-60, 60);
@@ -441,7 +442,6 @@ static void planimetric_areas_are_those_of_geodesic_polygons(void **state) {
 static void paths_follow_geodesics(void **state) {
     (void)state;
     start_dice(15);
-    const geo_ellipsoid wgs84 = GEO_WGS84;
     for (int n = 0; n < 40; n++) {
         double line[6];
         const double size = n % 2 ? 3 : 60, cell = n % 2 ? 1.0 / 1200 : 0.5;

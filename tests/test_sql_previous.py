@@ -41,22 +41,22 @@ def count_of(view, **given):
 
 def test_budgets():
     everything, tau = count_of(HERE)
-    equal("F38 without a budget tau is what was asked for", tau, 2.0)
-    equal("F38 a budget that is large enough changes nothing", count_of(HERE, max_triangles=everything), (everything, 2.0))
+    equal("F38_without_a_budget_tau_is_what_was_asked_for", tau, 2.0)
+    equal("F38_a_budget_that_is_large_enough_changes_nothing", count_of(HERE, max_triangles=everything), (everything, 2.0))
     # Down the ladder, by asking for fewer triangles than the step before had.
     steps, budget = [(everything, 2.0)], everything - 1
     while budget > 0:
         try:
             count, achieved = count_of(HERE, max_triangles=budget)
         except sqlite3.Error as error:
-            check("F38 a budget that no tolerance keeps is a sentence", "even the coarsest mesh of this view has %d triangles" % steps[-1][0]
+            check("F38_a_budget_that_no_tolerance_keeps_is_a_sentence", "even the coarsest mesh of this view has %d triangles" % steps[-1][0]
                   in str(error), error)
             break
         steps.append((count, achieved))
         budget = count - 1 - count // 50
-    check("F38 a ladder of many steps", len(steps) > 20, len(steps))
-    check("F38 counts fall and tolerances rise", all(a[0] > b[0] and a[1] < b[1] for a, b in zip(steps, steps[1:])), steps[:5])
-    check("F38 tolerances are steps of 2^(1/128)", all(abs(math.log2(t / 2) * 128 - round(math.log2(t / 2) * 128)) < 1e-6 for _, t in steps),
+    check("F38_a_ladder_of_many_steps", len(steps) > 20, len(steps))
+    check("F38_counts_fall_and_tolerances_rise", all(a[0] > b[0] and a[1] < b[1] for a, b in zip(steps, steps[1:])), steps[:5])
+    check("F38_tolerances_are_steps_of_2^(1/128)", all(abs(math.log2(t / 2) * 128 - round(math.log2(t / 2) * 128)) < 1e-6 for _, t in steps),
           steps[:5])
     # The tolerance of a budget is the least: one triangle less than a step has is the next step that has fewer, and all budgets between two
     # counts get the lower one.
@@ -66,17 +66,17 @@ def test_budgets():
         low = count_of(HERE, max_triangles=high[0] - 1)
         fine &= low[1] > high[1] and low[0] < high[0]
         fine &= count_of(HERE, max_triangles=low[0] + dice.below(high[0] - low[0])) == low
-    check("F38 the smallest tolerance that keeps the budget", fine)
+    check("F38_the_smallest_tolerance_that_keeps_the_budget", fine)
     for budget in (1, 2, 3):
         try:
             count, _ = count_of(HERE, max_triangles=budget)
-            check("F38 budget %d" % budget, count <= budget, count)
+            check("F38_budget_%d" % budget, count <= budget, count)
         except sqlite3.Error as error:
-            check("F38 budget %d" % budget, "even the coarsest" in str(error), error)
+            check("F38_budget_%d" % budget, "even the coarsest" in str(error), error)
     flat = camera(16, -40, 30, pitch=-20, yaw=0)
-    equal("F38 ties: a plane takes two triangles, whatever tau",
+    equal("F38_ties_a_plane_takes_two_triangles_whatever_tau",
           one(db, "SELECT count(*), max(achieved_tau) FROM rqt_view_triangles(?, 'flat', '{\"max_triangles\":2}')", flat), (2, 2.0))
-    raises("F38 of fewer than the mesh of corners", "even the coarsest mesh of this view has 2 triangles",
+    raises("F38_of_fewer_than_the_mesh_of_corners", "even the coarsest mesh of this view has 2 triangles",
            lambda: rows(db, "SELECT * FROM rqt_view(?, 'flat', '{\"max_triangles\":1}')", flat))
     raises("a budget of none", "option \"max_triangles\" must be an integer of 1 or more", lambda: count_of(HERE, max_triangles=0))
     raises("a budget is for views", "option \"max_triangles\" is for views",
@@ -149,14 +149,14 @@ def test_jitter():
     client.go(HERE)
     token, mesh = client.token, client.mesh
     same = all(client.go(ulps(HERE, n)).is_unchanged for n in range(50))
-    check("F36 an ulp of jitter changes nothing", same and client.token == token and client.mesh == mesh)
+    check("F36_an_ulp_of_jitter_changes_nothing", same and client.token == token and client.mesh == mesh)
     for name, view in (("on a sample", camera(100, -300, float(GRID[30][10] or 0))), ("below ground", camera(300, -400, -50)),
                        ("far away", camera(1e7, -700, 1e7, pitch=-45, yaw=270))):
         client = Client()
         client.go(view)
         token = client.token
-        check("F36 an ulp of jitter changes nothing %s" % name, all(client.go(ulps(view, n)).is_unchanged for n in range(6)) and client.token == token)
-    equal("F36 nor in rows", rows(db, "SELECT *, token FROM rqt_view(?, 'hills', ?)", ulps(HERE, 1), options(previous=Client_token(HERE))),
+        check("F36_an_ulp_of_jitter_changes_nothing_%s" % name, all(client.go(ulps(view, n)).is_unchanged for n in range(6)) and client.token == token)
+    equal("F36_nor_in_rows", rows(db, "SELECT *, token FROM rqt_view(?, 'hills', ?)", ulps(HERE, 1), options(previous=Client_token(HERE))),
           rows(db, "SELECT *, token FROM rqt_view(?, 'hills', ?)", HERE, options(previous=Client_token(HERE))))
 
 
@@ -170,8 +170,8 @@ def test_teleport():
     client.go(HERE)
     client.go(there)
     fresh.go(there)
-    check("F37 a teleport equals a fresh query", client.mesh == fresh.mesh and client.token == fresh.token and len(fresh.mesh.vertices) > 10)
-    equal("F37 in rows too", rows(db, "SELECT *, token FROM rqt_view(?, 'hills', ?)", there, options(previous=Client_token(HERE))),
+    check("F37_a_teleport_equals_a_fresh_query", client.mesh == fresh.mesh and client.token == fresh.token and len(fresh.mesh.vertices) > 10)
+    equal("F37_in_rows_too", rows(db, "SELECT *, token FROM rqt_view(?, 'hills', ?)", there, options(previous=Client_token(HERE))),
           rows(db, "SELECT *, token FROM rqt_view(?, 'hills', ?)", there, options(previous="")))
     lens = camera(300, -700, 400, fovy=61)
     before = client.token
@@ -192,8 +192,8 @@ def test_other_connections():
         here.go(view)
         there.go(view)
         same &= here.token == there.token and here.mesh == there.mesh
-    check("F37 tokens mean the same to every connection", same)
-    check("F37 and give the same bytes", blobs)
+    check("F37_tokens_mean_the_same_to_every_connection", same)
+    check("F37_and_give_the_same_bytes", blobs)
 
 
 def test_tokens():
@@ -277,7 +277,7 @@ def check_moves(name, found, least):
     for _, a, b, _, z, _ in moving:
         if a in by_row and b in by_row and z != (by_row[a][4] + by_row[b][4]) / 2:
             wrong.append((a, b, z))
-    check("F35 %s: z_from is z, or the middle of the parents'" % name, not wrong and len(moving) >= least, (wrong[:3], len(moving)))
+    check("F35_%s_z_from_is_z_or_the_middle_of_the_parents" % name, not wrong and len(moving) >= least, (wrong[:3], len(moving)))
 
 
 def test_geomorph():
@@ -286,14 +286,14 @@ def test_geomorph():
     check_moves("with a budget", rows(db, columns, HERE, options(max_triangles=500)), 5)
     token = Client_token(HERE)
     check_moves("nothing has changed", rows(db, columns, HERE, options(previous=token)), 0)
-    equal("F35 then nothing moves", {r[5] for r in rows(db, columns, HERE, options(previous=token))}, {1})
+    equal("F35_then_nothing_moves", {r[5] for r in rows(db, columns, HERE, options(previous=token))}, {1})
     there = camera(320, -660, 330)
     old = set(rows(db, "SELECT col, row FROM rqt_view(?, 'hills', ?)", HERE, options(previous=token)))
     found = rows(db, "SELECT col, row, weight, z = z_from FROM rqt_view(?, 'hills', ?)", there, options(previous=token))
     check_moves("from the last answer", rows(db, columns, there, options(previous=token)), 5)
-    check("F35 what was there stays", all(r[2] == 1 and r[3] for r in found if r[:2] in old))
+    check("F35_what_was_there_stays", all(r[2] == 1 and r[3] for r in found if r[:2] in old))
     stranger = s.connect(BASE)
-    equal("F35 for any connection", rows(stranger, columns, there, options(previous=token)), rows(db, columns, there, options(previous=token)))
+    equal("F35_for_any_connection", rows(stranger, columns, there, options(previous=token)), rows(db, columns, there, options(previous=token)))
     stranger.close()
     frame = camera(10.3, 46.2, 9000)
     equal("in a frame there is none", set(rows(db, "SELECT z_from, weight FROM rqt_view(?, 'lonlat', '{\"frame\":\"ecef\"}')", frame)), {(None, None)})

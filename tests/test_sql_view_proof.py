@@ -32,8 +32,8 @@ def prove_all(t, cameras):
         except sqlite3.Error as error:
             bad.append("%s: %s of %s" % (kind, error, json.dumps(camera)))
             continue
-        if v.faults(row):
-            bad.append("%s: %s of %s" % (kind, v.faults(row), json.dumps(camera)))
+        if v.faults(t, row):
+            bad.append("%s: %s of %s" % (kind, v.faults(t, row), json.dumps(camera)))
         seen.setdefault(kind, []).append(row)
     return bad, seen
 

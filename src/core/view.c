@@ -47,7 +47,7 @@
  * a tenth of a micrometre at 10^7 m, ten of them at 10^9 m. What is a product of few factors, kappa, is right to
  * far less than RELATIVE, by which eps is made smaller; t is where it comes from subtracting, and is then used only
  * below 100 (89.4 degrees off the axis). A sum that is not a number (an eye at 10^300 m) gives eps 0, shown. */
-#include "view.h"
+#include "view_core.h"
 
 #include <math.h>
 

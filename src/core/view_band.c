@@ -24,7 +24,7 @@
  * that is shown) no more than s, 1.4 times as much where it is seen slantwise and grows sideways and upward. What
  * is shown grows by turn = s, and by move seen from the eye, on each side. For long lenses s is less than the usual
  * 1/16. */
-#include "view.h"
+#include "view_core.h"
 
 #include <math.h>
 

@@ -60,8 +60,8 @@ def kinds_of(t, broken):
     table = {}
     for kind, camera in v.cameras(t, s.Dice(SEED), COUNT):
         seen = v.prove(t.db, camera)
-        if v.faults(seen):
-            broken.append("%s: %s of %s" % (kind, v.faults(seen), json.dumps(camera)))
+        if v.faults(t, seen):
+            broken.append("%s: %s of %s" % (kind, v.faults(t, seen), json.dumps(camera)))
         table.setdefault(kind, []).append((1, seen["drawn"] > 0, seen["triangles"], seen["ratio"]))
     return {kind: tuple(map(sum, list(zip(*found))[:3])) + (max(r[3] for r in found),) for kind, found in table.items()}
 

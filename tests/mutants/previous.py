@@ -42,4 +42,8 @@ MUTANTS = [
      F42),
     ("increment: corners past the last vertex", INCREMENT, "third < 0 || third > most", "third < 0", "test_core_increment", F42),
     ("increment: more comes than its bytes can be", INCREMENT, "come > left / LEAST_VERTEX", "false", "test_core_increment", F42),
+    ("previous: after a jump the last camera still counts", "ext/follow.c", "        v->camera = camera;\n", "", "test_sql_previous.py",
+     "F37_a_teleport_equals_a_fresh_query"),
+    ("budget: the step above the one that fits will do", "ext/budget.c", "high - low > 1", "high - low > 2", "test_sql_previous.py",
+     "F38_the_smallest_tolerance_that_keeps_the_budget"),
 ]

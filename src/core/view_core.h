@@ -1,6 +1,6 @@
-/* view.h - the guaranteed test with a piece that is known in two ways. view.c */
-#ifndef RQT_CORE_VIEW_H
-#define RQT_CORE_VIEW_H
+/* view_core.h - the guaranteed test with a piece that is known in two ways. view.c */
+#ifndef RQT_VIEW_CORE_H
+#define RQT_VIEW_CORE_H
 
 #include "internal.h"
 #include "rqt_view.h"
