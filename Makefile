@@ -12,7 +12,7 @@ SANITIZE ?=
 # No fused multiply-adds: the same input gives the same bytes on every machine.
 CFLAGS += -std=gnu11 -g $(OPTIMIZE) $(WARNINGS) -fPIC -ffp-contract=off -fvisibility=hidden -MMD -MP $(SANITIZE)
 CXXFLAGS += -std=c++17 -g $(OPTIMIZE) $(WARNINGS) -fPIC -ffp-contract=off -fvisibility=hidden -MMD -MP $(SANITIZE)
-INCLUDES = -Isrc/core -Isrc/store -Isrc/geo -Isrc/verify -Isrc/format -Isrc/import -Iext -I$(BUILD)/generated
+INCLUDES = -Isrc/core -Isrc/store -Isrc/geo -Isrc/verify -Isrc/format -Isrc/import -Isrc/text -Isrc/picture -Isrc/serve -Iext -I$(BUILD)/generated
 
 CORE = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/core/*.c))
 PLAIN = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/verify/*.c src/format/*.c))
@@ -21,12 +21,16 @@ SQL_SOURCES = $(wildcard src/store/*.c ext/*.c)
 SQL_HOSTED = $(patsubst %.c,$(BUILD)/hosted/%.o,$(SQL_SOURCES))
 SQL_LINKED = $(patsubst %.c,$(BUILD)/linked/%.o,$(SQL_SOURCES))
 IMPORT = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/import/*.c))
+PICTURE = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/picture/*.c src/text/*.c))
+SERVE = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/serve/*.c)) $(BUILD)/generated/web_files.o
 CLI = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/cli/*.c))
+# What the query service has in it: the page, and what it says of itself.
+WEB_FILES = $(wildcard src/serve/web/*) src/serve/openapi.json
 GENERATED = $(BUILD)/generated/schema_sql.h
 
 LIBS_CORE = -lzstd -lm
 LIBS_EXT = -lGeographicLib -lgeos_c -lproj -lcjson $(LIBS_CORE)
-LIBS_CLI = $(LIBS_EXT) -lsqlite3 $(shell gdal-config --libs 2>/dev/null) $(shell pkg-config --libs cairo libpng 2>/dev/null) -lpthread -lstdc++
+LIBS_CLI = $(LIBS_EXT) -lsqlite3 $(shell gdal-config --libs 2>/dev/null) $(shell pkg-config --libs cairo libpng 2>/dev/null) -lmicrohttpd -lz -lpthread -lstdc++
 GDAL_CFLAGS = $(shell gdal-config --cflags 2>/dev/null)
 CAIRO_CFLAGS = $(shell pkg-config --cflags cairo libpng 2>/dev/null)
 
@@ -47,7 +51,7 @@ $(BUILD)/librqt.a: $(CORE)
 $(BUILD)/rqt.so: $(SQL_HOSTED) $(PLAIN) $(GEO) $(BUILD)/librqt.a ext/exports.map
 	@echo "  link $@"; $(CXX) $(SANITIZE) -shared -Wl,--version-script=ext/exports.map -Wl,-z,defs -o $@ $(SQL_HOSTED) $(PLAIN) $(GEO) $(BUILD)/librqt.a $(LIBS_EXT)
 
-$(BUILD)/rqt: $(CLI) $(SQL_LINKED) $(IMPORT) $(PLAIN) $(GEO) $(BUILD)/librqt.a
+$(BUILD)/rqt: $(CLI) $(SERVE) $(PICTURE) $(SQL_LINKED) $(IMPORT) $(PLAIN) $(GEO) $(BUILD)/librqt.a
 	@echo "  link $@"; $(CXX) $(SANITIZE) -o $@ $^ $(LIBS_CLI)
 
 $(BUILD)/hosted/%.o: %.c $(GENERATED)
@@ -59,6 +63,20 @@ $(BUILD)/linked/%.o: %.c $(GENERATED)
 $(BUILD)/import/%.o: src/import/%.c
 	@mkdir -p $(@D)
 	@echo "  compile $<"; $(CC) $(CFLAGS) $(INCLUDES) -DSQLITE_CORE $(GDAL_CFLAGS) -c $< -o $@
+$(BUILD)/text/%.o: src/text/%.c
+	@mkdir -p $(@D)
+	@echo "  compile $<"; $(CC) $(CFLAGS) $(INCLUDES) -DSQLITE_CORE -c $< -o $@
+$(BUILD)/picture/%.o: src/picture/%.c
+	@mkdir -p $(@D)
+	@echo "  compile $<"; $(CC) $(CFLAGS) $(INCLUDES) -DSQLITE_CORE $(CAIRO_CFLAGS) -c $< -o $@
+$(BUILD)/serve/%.o: src/serve/%.c
+	@mkdir -p $(@D)
+	@echo "  compile $<"; $(CC) $(CFLAGS) $(INCLUDES) -DSQLITE_CORE -c $< -o $@
+$(BUILD)/generated/web_files.c: src/serve/embed.sh $(WEB_FILES)
+	@mkdir -p $(@D)
+	@./src/serve/embed.sh $(WEB_FILES) > $@
+$(BUILD)/generated/web_files.o: $(BUILD)/generated/web_files.c
+	@$(CC) $(CFLAGS) $(INCLUDES) -c $< -o $@
 $(BUILD)/cli/%.o: src/cli/%.c $(GENERATED)
 	@mkdir -p $(@D)
 	@echo "  compile $<"; $(CC) $(CFLAGS) $(INCLUDES) -DSQLITE_CORE $(CAIRO_CFLAGS) -c $< -o $@
@@ -84,6 +102,11 @@ $(BUILD)/generated/schema_sql.h: sql/schema.sql sql/terrain.sql sql/fill.sql sql
 .PHONY: demo
 demo: all ## import a real DEM and show what rqt does with it; pictures in build/demo
 	@BUILD=$(BUILD) ./examples/demo.sh
+
+.PHONY: serve-demo
+serve-demo: all ## the query service and its page on the demo's terrain, at http://127.0.0.1:8080/
+	@[ -e $(BUILD)/demo/white-mountains.gpkg ] || $(MAKE) --no-print-directory demo
+	@$(BUILD)/rqt serve $(BUILD)/demo/white-mountains.gpkg
 
 # ------------------------------------------------------------------------------------------------------ tests
 # Everything that a test may want of us in one archive; the linker takes what each one needs.
@@ -147,13 +170,24 @@ coverage: ## the test programs in a build that counts: the core's lines, 100 % b
 	@BUILD=$(BUILD)/coverage PROGRAMS="$(notdir $(TEST_PROGRAMS))" ./tests/run.sh programs
 	@/usr/bin/python3 tests/coverage.py $(BUILD)/coverage
 
-# What runs on several threads: readers beside a writer, the import's reader and workers, which work on sweeps and builds.
+# What runs on several threads: readers beside a writer, the import's reader and workers, which work on sweeps and builds;
+# and the query service's workers.
 THREADED = test_fault_threads
-.PHONY: test-threads
+.PHONY: test-threads test-serve
 test-threads: ## what runs on several threads, under ThreadSanitizer
 	@./src/install-packages.sh build test
-	@$(MAKE) --no-print-directory -j2 BUILD=$(BUILD)/threads OPTIMIZE=-O1 WARNINGS=-w SANITIZE=-fsanitize=thread $(THREADED:%=$(BUILD)/threads/tests/%)
+	@$(MAKE) --no-print-directory -j2 products
+	@$(MAKE) --no-print-directory -j2 BUILD=$(BUILD)/threads OPTIMIZE=-O1 WARNINGS=-w SANITIZE=-fsanitize=thread $(THREADED:%=$(BUILD)/threads/tests/%) $(BUILD)/threads/rqt
 	@BUILD=$(BUILD)/threads PROGRAMS="$(THREADED)" ./tests/run.sh programs
+	@TSAN_OPTIONS=suppressions=$(CURDIR)/tests/threads.supp RQT_HOSTILE_MIB=1024 RQT=$(CURDIR)/$(BUILD)/threads/rqt RQT_SO=$(CURDIR)/$(BUILD)/rqt.so ./tests/test_serve.sh | grep -v '^ok'
+
+test-serve: ## the query service's tests, plain and under ASan and UBSan
+	@./src/install-packages.sh build test
+	@$(MAKE) --no-print-directory -j2 products
+	@$(MAKE) --no-print-directory -j2 BUILD=$(BUILD)/sanitized OPTIMIZE=-O1 \
+	  SANITIZE="-fsanitize=address,undefined -fno-sanitize-recover=undefined" $(BUILD)/sanitized/rqt
+	@RQT=$(CURDIR)/$(BUILD)/rqt RQT_SO=$(CURDIR)/$(BUILD)/rqt.so ./tests/test_serve.sh | grep -v '^ok'
+	@ASAN_OPTIONS=detect_leaks=1 LSAN_OPTIONS=suppressions=$(CURDIR)/tests/leaks.supp:print_suppressions=0 RQT_HOSTILE_MIB=1024 RQT=$(CURDIR)/$(BUILD)/sanitized/rqt RQT_SO=$(CURDIR)/$(BUILD)/rqt.so ./tests/test_serve.sh | grep -v '^ok'
 
 # clang's libFuzzer steers by what code an input reaches; what it finds stays in build/fuzz/NAME.
 SECONDS ?= 60
@@ -215,7 +249,7 @@ check-docs: ## fail when ext/SQL.md, the README's session or the list of fuzzers
 	@./tests/check_fuzz.sh
 
 # ---------------------------------------------------------------------------------------------------- benches
-.PHONY: bench bench-data bench-update bench-table1 bench-views chart chart-views peers
+.PHONY: bench bench-data bench-update bench-table1 bench-serve bench-views chart chart-views peers
 bench: ## speed and size beside GDAL's, medians of five and more
 	@./src/install-packages.sh build test
 	@$(MAKE) --no-print-directory -j2 products
@@ -234,6 +268,10 @@ bench-table1: ## share of vertices over eps beside the paper's table 1
 	@$(MAKE) --no-print-directory -j2 products
 	@BUILD=$(BUILD) ./tests/bench/bench_table1.sh
 
+bench-serve: ## the query service under wrk, beside nginx that sends the same bytes
+	@./src/install-packages.sh build bench
+	@$(MAKE) --no-print-directory -j2 products
+	@BUILD=$(BUILD) ./tests/bench/bench_serve.sh
 bench-views: ## what views cost: one megapixel, fly-overs, ETOPO5 over a network, beside the papers' figures
 	@./src/install-packages.sh build test
 	@./src/install-packages.sh views || echo "No ETOPO5: the table goes without" >&2

@@ -31,6 +31,18 @@ const function rqt_functions[] = {
      .example = "SELECT rqt_build_info()",
      .call = call_build_info,
      .flags = SQLITE_INNOCUOUS},
+    {.name = "rqt_limit",
+     .arguments = "name [, most]",
+     .returns = "INTEGER",
+     .purpose =
+         "What one answer of this connection may be at most, for services: name triangles: of a mesh, and its "
+         "vertices; samples: under the mesh of a proof. More is refused, with SQLITE_TOOBIG. 0, the default: any "
+         "number. Gives the limit that held before.",
+     .example = "SELECT rqt_limit('triangles')",
+     .call = call_limit,
+     .least = 1,
+     .most = 2,
+     .flags = SQLITE_DIRECTONLY}, /* changes the connection: not for views */
     {.name = "rqt_help",
      .arguments = "",
      .returns = "name, kind, arguments, returns, purpose, example",

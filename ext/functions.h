@@ -188,5 +188,6 @@ scalar_call call_version, call_build_info, call_mesh, call_view_mesh, call_heigh
 scalar_call call_block_info, call_block_check, call_block_dump;                    /* block_functions.c */
 scalar_call call_bbox, call_circle, call_corridor;                                 /* shapes.c */
 scalar_call call_delta;                                                            /* delta.c */
+scalar_call call_limit;                                                            /* limit.c */
 
 #endif

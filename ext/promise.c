@@ -95,6 +95,11 @@ static int begin(promise *p, const request *r, const int32_t box[4], int32_t aro
                    .region = r->region,
                    .ends = {x0 == 0, y0 == 0, x1 == last_col, y1 == last_row}};
     const sqlite3_uint64 samples = (sqlite3_uint64)p->width * (sqlite3_uint64)p->height;
+    const sqlite3_int64 most = store_limits_of(r->store)->samples;
+    if (most > 0 && samples > (sqlite3_uint64)most) {
+        (void)fail(error, "there are more than %lld samples under the mesh, the limit here", most);
+        return *error ? SQLITE_TOOBIG : SQLITE_NOMEM;
+    }
     p->q = sqlite3_malloc64(samples * sizeof *p->q);
     p->valid = sqlite3_malloc64(samples);
     int code = p->q && p->valid ? SQLITE_OK : SQLITE_NOMEM;

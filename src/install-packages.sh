@@ -1,19 +1,20 @@
 #!/bin/sh
 # install-packages.sh PURPOSE... - installs the Debian packages that a purpose needs and this machine lacks, saying which.
 #
-# Purposes: build, test, format, fuzz, lint, peers, views (ETOPO5, and pictures of views), qgis (650 MB). Does nothing, silently,
-# when all is there. Needs root or sudo only when something is missing. On another system it says what to install by hand.
+# Purposes: build, test, format, fuzz, lint, bench, peers, views (ETOPO5, and pictures of views), qgis (650 MB). Does nothing,
+# silently, when all is there. Needs root or sudo only when something is missing. On another system it says what to install by hand.
 set -eu
 
 packages_for() {
     case $1 in
     build) echo gcc g++ libc6-dev make pkg-config sqlite3 libsqlite3-dev libzstd-dev libgdal-dev libgeographiclib-dev \
-        libgeos-dev libproj-dev proj-data libcjson-dev libcairo2-dev libpng-dev fonts-dejavu-core gnuplot-nox ;;
+        libgeos-dev libproj-dev proj-data libcjson-dev libcairo2-dev libpng-dev fonts-dejavu-core gnuplot-nox libmicrohttpd-dev zlib1g-dev ;;
     test) echo libcmocka-dev libgmp-dev gdal-bin libsqlite3-mod-spatialite python3 unzip binutils git ;;
     format) echo clang-format ;;
     qgis) echo python3-qgis ;;
     fuzz) echo clang-14 libclang-rt-14-dev ;;
     lint) echo clang-tidy-14 cppcheck ;;
+    bench) echo wrk nginx-light curl python3 util-linux ;;
     views) echo ferret-datasets python3-pil ;;
     peers) command -v node >/dev/null 2>&1 && command -v npm >/dev/null 2>&1 || echo nodejs npm ;;
     *) echo "install-packages.sh: unknown purpose $1" >&2; exit 2 ;;

@@ -76,7 +76,6 @@ done
 refuses "no command" 2 "a command is missing"
 refuses "unknown command" 2 "there is no command dance" dance
 refuses "unknown option before a command" 2 "there is no option --dance" --dance
-for c in serve; do refuses "rqt $c is for later" 2 "not in this version" $c x; done
 
 # ------------------------------------------------------------------------------------------------------- import
 refuses "import: nothing" 2 "a source and a database are missing" import

@@ -39,6 +39,7 @@ SCALARS = {  # argument counts, deterministic
     "rqt_block_info": ([1], True),
     "rqt_block_check": ([1], True),
     "rqt_block_dump": ([1], True),
+    "rqt_limit": ([1, 2], False),
 }
 DETERMINISTIC, DIRECTONLY, INNOCUOUS = 0x800, 0x80000, 0x200000
 
@@ -66,8 +67,11 @@ equal("no scalar function beside those of the contract", sorted(listed), sorted(
 for name, (counts, deterministic) in SCALARS.items():
     equal("%s takes the contract's numbers of arguments" % name, sorted(a for a, f in listed.get(name, [])), counts)
     flags = [f for a, f in listed.get(name, [(0, 0)])]
-    check("%s reads nothing but this connection's databases, and says so" % name,
-          all(f & INNOCUOUS and not f & DIRECTONLY for f in flags), flags)
+    if name == "rqt_limit":
+        check("rqt_limit changes the connection, and is for no view or trigger", all(f & DIRECTONLY for f in flags), flags)
+    else:
+        check("%s reads nothing but this connection's databases, and says so" % name,
+              all(f & INNOCUOUS and not f & DIRECTONLY for f in flags), flags)
     if deterministic is not None:
         check("%s is %sdeterministic" % (name, "" if deterministic else "not "),
               all(bool(f & DETERMINISTIC) == deterministic for f in flags), flags)

@@ -68,7 +68,7 @@ bool chart_read_peers(const char *path, int64_t samples, chart_points *points) {
     if (ok && ferror(file)) ok = cli_fail("%s: it cannot be read", path) == CLI_OK;
     fclose(file);
     if (ok && other)
-        cli_say("%s has meshes of %s samples, and here are %s: they are left out", path, cli_count(other),
-                cli_count(samples));
+        cli_say("%s has meshes of %s samples, and here are %s: they are left out", path, text_count(other),
+                text_count(samples));
     return ok;
 }

@@ -10,7 +10,9 @@
 #ifndef RQT_CLI_H
 #define RQT_CLI_H
 
+#include "picture.h"
 #include "store.h"
+#include "text.h"
 
 #include <getopt.h>
 #include <signal.h>
@@ -24,7 +26,7 @@ typedef struct cli_command {
 } cli_command;
 
 extern const cli_command command_import, command_update, command_info, command_check, command_verify, command_mesh,
-    command_chart;
+    command_serve, command_chart;
 
 /* ------------------------------------------------------------------------------------ sentences (main.c) -- */
 /* The command whose name goes before every sentence. */
@@ -79,30 +81,11 @@ void cli_bind_query(sqlite3_stmt *statement, const char *region, double eps, con
 /* The terrain of this name, or the only one; with the store that it lives in. false after a sentence. */
 bool cli_find_terrain(sqlite3 *db, const char *name, store **s, const store_terrain **terrain);
 
-/* What rqt_verify() says. */
-typedef struct cli_proof {
-    int64_t samples, vertices, triangles;
-    double max_error, rms_error;
-    bool has_worst;
-    double x, y;
-    int64_t t_junctions, overlaps, uncovered;
-} cli_proof;
+/* picture_proof_read, with a sentence. */
 bool cli_verify(sqlite3 *db, const char *region, double eps, const char *terrain, const char *options,
-                cli_proof *proof);
-/* Does the proof hold for a tolerance, on a terrain whose heights are rounded by quantum_error? */
-bool cli_proof_holds(const cli_proof *proof, double eps, double quantum_error);
+                picture_proof *proof);
 
-/* ------------------------------------------------------------------------------------------ text (text.c) -- */
-/* Texts of a ring of buffers: good for the arguments of one printf. */
-const char *cli_count(int64_t n);                 /* 1 234 567 */
-const char *cli_real(double value);               /* 6 significant digits, no trailing zeros */
-const char *cli_metres(double value);             /* an error: 4 significant digits, plain */
-const char *cli_place(double value, bool lonlat); /* a coordinate, to 0.1 m or better, no trailing zeros */
-const char *cli_length(double metres);            /* 850 m, 12.3 km */
-const char *cli_crs_name(const char *wkt);        /* the name in a WKT, "none" when there is none */
-/* The same for people: "EPSG:26710" where the WKT has a code and no name worth showing. */
-const char *cli_crs_label(const store_terrain *terrain);
-
+/* ------------------------------------------------------------------------------------------ tables (table.c) -- */
 /* A table of texts, columns aligned by what they hold. Memory that is missing makes it incomplete and
  * cli_table_print say so. */
 typedef struct cli_table {
@@ -114,10 +97,6 @@ typedef struct cli_table {
 void cli_table_begin(cli_table *table, int columns, const char *align);
 void cli_table_add(cli_table *table, const char *const *cells);
 void cli_table_print(cli_table *table); /* and release */
-
-/* ------------------------------------------------------------------------------------ terrain on the ground -- */
-/* Metres of ground for one column and one row in the middle of a window; for lon/lat at the middle latitude. */
-void cli_ground(const store_terrain *terrain, int32_t row0, int32_t rows, double *per_column, double *per_row);
 
 /* ------------------------------------------------------------------------------------ progress (progress.c) -- */
 typedef struct cli_progress {
@@ -149,8 +128,7 @@ void cli_output_discard(cli_output *output);
 /* One layer, a row per triangle (layer.c). */
 int cli_write_layer(sqlite3 *db, const char *region, double eps, const char *terrain, const char *options,
                     const cli_output *output);
-/* A picture (picture.c): panels of shaded relief and mesh, width units wide. */
-int cli_write_picture(sqlite3 *db, const char *region, const double *eps, int count, const char *terrain,
-                      const char *options, int width, bool svg, const cli_output *output);
+/* A picture, of the room picture. */
+int cli_write_picture(sqlite3 *db, const picture_request *request, const cli_output *output);
 
 #endif

@@ -147,9 +147,9 @@ static void describe_terrain(const job *j, const store_terrain *t, char text[CHA
     if (t->lonlat)
         snprintf(cell, sizeof cell, "%.4g arc seconds", fabs(t->placement.dx) * 3600);
     else
-        snprintf(cell, sizeof cell, "%s m", cli_real(t->cost.cell));
+        snprintf(cell, sizeof cell, "%s m", text_real(t->cost.cell));
     snprintf(text, CHART_TEXT, "%s, %d x %d samples of %s, heights in steps of %s m%s", t->name, t->lattice.width,
-             t->lattice.height, cell, cli_real(fabs(rqt_unit_factor(&t->unit)) / (double)t->unit.d),
+             t->lattice.height, cell, text_real(fabs(rqt_unit_factor(&t->unit)) / (double)t->unit.d),
              j->region ? ", a region of it" : "");
 }
 
@@ -344,7 +344,7 @@ static bool chart_family(job *j, const family *f, chart_kind kind) {
             ok = measure_family(j, f, &j->methods[m], window, &points);
     free(window);
     snprintf(j->sheet.title, sizeof j->sheet.title, "%d terrains %s_%s_*, tolerance %s m", f->count, f->stem,
-             is_size ? "size" : "noise", cli_real(j->at));
+             is_size ? "size" : "noise", text_real(j->at));
     if (ok && points.count)
         ok = draw(j, kind, &points);
     else if (ok)

@@ -159,27 +159,27 @@ static int set_option(import_options *o, int option) {
 
 static void print_report(const import_report *r, double seconds) {
     const double samples = (double)r->samples;
-    printf("%s: %s samples, ", r->name, cli_count(r->samples));
+    printf("%s: %s samples, ", r->name, text_count(r->samples));
     if (r->voids)
-        printf("%s void (%.3g %%)\n", cli_count(r->voids), 100.0 * (double)r->voids / samples);
+        printf("%s void (%.3g %%)\n", text_count(r->voids), 100.0 * (double)r->voids / samples);
     else
         puts("none void");
-    printf("  %s block%s, %s bytes, %.2f bits per sample\n", cli_count(r->blocks), r->blocks == 1 ? "" : "s",
-           cli_count(r->bytes), 8.0 * (double)r->bytes / samples);
+    printf("  %s block%s, %s bytes, %.2f bits per sample\n", text_count(r->blocks), r->blocks == 1 ? "" : "s",
+           text_count(r->bytes), 8.0 * (double)r->bytes / samples);
     printf("  %.2f s (reading %.2f, errors and blocks %.2f, writing %.2f), %.1f Msamples/s\n", seconds,
            r->seconds_read, r->seconds_errors, r->seconds_blocks,
            samples / (seconds > 1e-9 ? seconds : 1e-9) / 1e6);
     if (r->sources > 1 || r->samples_resumed) {
-        printf("  %s samples read from %s source%s", cli_count(r->samples_read), cli_count(r->sources),
+        printf("  %s samples read from %s source%s", text_count(r->samples_read), text_count(r->sources),
                r->sources == 1 ? "" : "s");
-        if (r->samples_resumed) printf("; %s from an earlier run", cli_count(r->samples_resumed));
+        if (r->samples_resumed) printf("; %s from an earlier run", text_count(r->samples_resumed));
         putchar('\n');
     }
-    if (r->filled) printf("  %s void samples filled\n", cli_count(r->filled));
-    if (r->sea) printf("  %s void samples made sea\n", cli_count(r->sea));
+    if (r->filled) printf("  %s void samples filled\n", text_count(r->filled));
+    if (r->sea) printf("  %s void samples made sea\n", text_count(r->sea));
     if (r->overlap)
-        printf("  %s samples in more than one source, %s of them differ\n", cli_count(r->overlap),
-               cli_count(r->overlap_differs));
+        printf("  %s samples in more than one source, %s of them differ\n", text_count(r->overlap),
+               text_count(r->overlap_differs));
 }
 
 static int run(int argc, char **argv) {

@@ -77,19 +77,19 @@ static void extent_of(const store_terrain *t, double box[4]) {
 static void add_row(cli_table *table, const store_terrain *t, const figures *f) {
     char samples[64], heights[80], bits[32], cell[80], percent[32];
     double across, down;
-    cli_ground(t, 0, t->lattice.height, &across, &down);
+    text_ground(t, 0, t->lattice.height, &across, &down);
     snprintf(samples, sizeof samples, "%d x %d", t->lattice.width, t->lattice.height);
     if (!*t->crs)
-        snprintf(cell, sizeof cell, "%s x %s", cli_real(fabs(t->placement.dx)), cli_real(fabs(t->placement.dy)));
+        snprintf(cell, sizeof cell, "%s x %s", text_real(fabs(t->placement.dx)), text_real(fabs(t->placement.dy)));
     else if (fmax(across, down) < 999.5)
         snprintf(cell, sizeof cell, "%.3g x %.3g m", across, down);
     else
-        snprintf(cell, sizeof cell, "%s x %s", cli_length(across), cli_length(down));
-    snprintf(heights, sizeof heights, "%s .. %s m", cli_real(f->min_z), cli_real(f->max_z));
+        snprintf(cell, sizeof cell, "%s x %s", text_length(across), text_length(down));
+    snprintf(heights, sizeof heights, "%s .. %s m", text_real(f->min_z), text_real(f->max_z));
     snprintf(bits, sizeof bits, "%.2f", 8.0 * (double)f->bytes / samples_of(t));
     snprintf(percent, sizeof percent, "%.3g %%", 100.0 * (double)f->voids / samples_of(t));
-    char *const quantum = sqlite3_mprintf("%s m", cli_real(f->quantum));
-    char *const error = sqlite3_mprintf("%s m", cli_real(f->max_error));
+    char *const quantum = sqlite3_mprintf("%s m", text_real(f->quantum));
+    char *const error = sqlite3_mprintf("%s m", text_real(f->max_error));
     const char *cells[] = {t->name,
                            samples,
                            cell,
@@ -98,8 +98,8 @@ static void add_row(cli_table *table, const store_terrain *t, const figures *f) 
                                             : "all void",
                            quantum ? quantum : "",
                            f->voids ? percent : "0",
-                           cli_count(f->blocks),
-                           cli_count(f->bytes),
+                           text_count(f->blocks),
+                           text_count(f->bytes),
                            bits,
                            error ? error : ""};
     cli_table_add(table, cells);
@@ -120,26 +120,26 @@ static void print_lines(const char *text) {
 static void print_details(const store_terrain *t, const figures *f) {
     double box[4], across, down;
     extent_of(t, box);
-    cli_ground(t, 0, t->lattice.height, &across, &down);
+    text_ground(t, 0, t->lattice.height, &across, &down);
     printf("\n%s%s\n", t->name, t->complete ? "" : "  (INCOMPLETE: its import did not finish; queries refuse it)");
-    printf("  extent   x %s .. %s, y %s .. %s", cli_place(box[0], t->lonlat), cli_place(box[2], t->lonlat),
-           cli_place(box[1], t->lonlat), cli_place(box[3], t->lonlat));
+    printf("  extent   x %s .. %s, y %s .. %s", text_place(box[0], t->lonlat), text_place(box[2], t->lonlat),
+           text_place(box[1], t->lonlat), text_place(box[3], t->lonlat));
     if (*t->crs)
-        printf(" (%s x %s)", cli_length(across * (t->lattice.width - 1)),
-               cli_length(down * (t->lattice.height - 1)));
+        printf(" (%s x %s)", text_length(across * (t->lattice.width - 1)),
+               text_length(down * (t->lattice.height - 1)));
     printf("\n  cell     %.10g x %.10g%s\n", fabs(t->placement.dx), fabs(t->placement.dy),
            t->lonlat ? " degrees" : "");
-    const char *crs = cli_crs_label(t);
+    const char *crs = text_crs_label(t);
     printf("  CRS      %s", crs);
     if (t->srid && strncmp(crs, "EPSG:", 5)) printf(" (SRID %d)", t->srid);
     if (*t->vertical) printf(", heights above %s", t->vertical);
     printf("\n  blocks   of %d x %d samples\n", (1 << t->k) + 1, (1 << t->k) + 1);
     if (f->filled[0])
-        printf("  filled   %s void samples, from their neighbours (table rqt_fill_%lld)\n", cli_count(f->filled[0]),
-               (long long)t->id);
+        printf("  filled   %s void samples, from their neighbours (table rqt_fill_%lld)\n",
+               text_count(f->filled[0]), (long long)t->id);
     if (f->filled[1])
-        printf("  sea      %s void samples (table rqt_fill_%lld)\n", cli_count(f->filled[1]), (long long)t->id);
-    if (t->quantum_error > 0) printf("  rounded  by at most %s m on import\n", cli_real(t->quantum_error));
+        printf("  sea      %s void samples (table rqt_fill_%lld)\n", text_count(f->filled[1]), (long long)t->id);
+    if (t->quantum_error > 0) printf("  rounded  by at most %s m on import\n", text_real(t->quantum_error));
     printf("  source   ");
     print_lines(t->source);
     printf("  imported %s\n", t->created);

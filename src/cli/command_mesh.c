@@ -2,7 +2,7 @@
  *
  *   .obj .ply   the bytes of SQL's rqt_mesh()
  *   .gpkg       a layer of triangles (layer.c)
- *   .svg .png   a picture (picture.c); a list of eps makes a panel of each
+ *   .svg .png   a picture (the room picture); a list of eps makes a panel of each
  */
 #include "cli.h"
 
@@ -108,7 +108,14 @@ static int mesh(sqlite3 *db, const request *r, const char *region) {
     else if (r->kind == OBJ || r->kind == PLY)
         status = write_bytes(db, r, region, &output);
     else
-        status = cli_write_picture(db, region, r->eps, r->count, r->terrain, r->options, r->width, r->kind == SVG,
+        status = cli_write_picture(db,
+                                   &(picture_request){.region = region,
+                                                      .eps = r->eps,
+                                                      .count = r->count,
+                                                      .terrain = r->terrain,
+                                                      .options = r->options,
+                                                      .width = r->width,
+                                                      .svg = r->kind == SVG},
                                    &output);
     if (status == CLI_OK) return cli_output_finish(&output) ? CLI_OK : CLI_FAILED;
     cli_output_discard(&output);

@@ -73,14 +73,15 @@ static int set_option(import_options *o, bool *voids, int option) {
 }
 
 static void print_report(const import_update_report *r, double seconds) {
-    printf("%s: %s samples put in, %s of them differ\n", r->name, cli_count(r->samples), cli_count(r->changed));
+    printf("%s: %s samples put in, %s of them differ\n", r->name, text_count(r->samples), text_count(r->changed));
     if (r->changed == 0) {
         puts("  nothing written");
         return;
     }
-    printf("  %s block%s and %s more summar%s written, %s bytes; %s block%s read, %s bytes\n", cli_count(r->blocks),
-           r->blocks == 1 ? "" : "s", cli_count(r->summaries), r->summaries == 1 ? "y" : "ies", cli_count(r->bytes),
-           cli_count(r->blocks_read), r->blocks_read == 1 ? "" : "s", cli_count(r->bytes_read));
+    printf("  %s block%s and %s more summar%s written, %s bytes; %s block%s read, %s bytes\n",
+           text_count(r->blocks), r->blocks == 1 ? "" : "s", text_count(r->summaries),
+           r->summaries == 1 ? "y" : "ies", text_count(r->bytes), text_count(r->blocks_read),
+           r->blocks_read == 1 ? "" : "s", text_count(r->bytes_read));
     printf("  %.3f s (reading %.3f, updating %.3f)\n", seconds, r->seconds_read, r->seconds_update);
 }
 

@@ -50,26 +50,26 @@ static bool verify(sqlite3 *db, const char *region, const double *eps, int count
     cli_table table;
     cli_table_begin(&table, 13, "rrrrrrrrrrrrl");
     for (int i = 0; i < count; i++) {
-        cli_proof proof;
+        picture_proof proof;
         answered = cli_verify(db, region, eps[i], name, options, &proof);
         if (!answered) break;
         if (!i) cli_table_add(&table, heads);
-        const bool holds = cli_proof_holds(&proof, eps[i], t->quantum_error);
+        const bool holds = picture_proof_holds(&proof, eps[i], t->quantum_error);
         char share[32] = "-";
         if (proof.samples)
             snprintf(share, sizeof share, "%.2f %%", 100.0 * (double)proof.vertices / (double)proof.samples);
-        const char *cells[] = {cli_real(eps[i]),
-                               cli_count(proof.samples),
-                               cli_count(proof.vertices),
-                               cli_count(proof.triangles),
+        const char *cells[] = {text_real(eps[i]),
+                               text_count(proof.samples),
+                               text_count(proof.vertices),
+                               text_count(proof.triangles),
                                share,
-                               cli_metres(proof.max_error),
-                               cli_metres(proof.rms_error),
-                               proof.has_worst ? cli_place(proof.x, t->lonlat) : "-",
-                               proof.has_worst ? cli_place(proof.y, t->lonlat) : "-",
-                               cli_count(proof.t_junctions),
-                               cli_count(proof.overlaps),
-                               cli_count(proof.uncovered),
+                               text_metres(proof.max_error),
+                               text_metres(proof.rms_error),
+                               proof.has_worst ? text_place(proof.x, t->lonlat) : "-",
+                               proof.has_worst ? text_place(proof.y, t->lonlat) : "-",
+                               text_count(proof.t_junctions),
+                               text_count(proof.overlaps),
+                               text_count(proof.uncovered),
                                !holds                                 ? "FAILED"
                                : proof.triangles || proof.samples > 0 ? "holds"
                                                                       : "empty"};
@@ -81,7 +81,7 @@ static bool verify(sqlite3 *db, const char *region, const double *eps, int count
     if (answered && t->quantum_error > 0)
         cli_say("heights of %s were rounded when it was imported: the source is within %s m of them, which the "
                 "verdict takes into account",
-                t->name, cli_real(t->quantum_error));
+                t->name, text_real(t->quantum_error));
     return answered && all_hold;
 }
 

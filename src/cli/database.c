@@ -7,25 +7,25 @@
 #include "rqt_extension.h"
 
 #include <errno.h>
-#include <math.h>
 #include <string.h>
 #include <sys/stat.h>
 
 /* A writer (an import, say) holds its lock for moments only. */
 #define BUSY_MILLISECONDS 5000
 
+/* "rqt_mesh(): eps ..." names the SQL function; who typed a command knows only the command. */
+static const char *without_function(const char *text) {
+    if (strncmp(text, "rqt_", 4) != 0) return text;
+    const size_t name = strspn(text, "abcdefghijklmnopqrstuvwxyz_");
+    return strncmp(text + name, "(): ", 4) ? text : text + name + 4;
+}
+
 int cli_fail_database(sqlite3 *db) {
-    const char *text = sqlite3_errmsg(db);
-    /* "rqt_mesh(): eps ..." names the SQL function; who typed a command knows only the command. */
-    if (!strncmp(text, "rqt_", 4)) {
-        const size_t name = strspn(text, "abcdefghijklmnopqrstuvwxyz_");
-        if (!strncmp(text + name, "(): ", 4)) text += name + 4;
-    }
-    return cli_fail("%s", text);
+    return cli_fail("%s", without_function(sqlite3_errmsg(db)));
 }
 
 int cli_fail_store(int code, char *sentence) {
-    cli_fail("%s", sentence ? sentence : sqlite3_errstr(code));
+    cli_fail("%s", sentence ? without_function(sentence) : sqlite3_errstr(code));
     sqlite3_free(sentence);
     return CLI_FAILED;
 }
@@ -104,38 +104,8 @@ bool cli_find_terrain(sqlite3 *db, const char *name, store **s, const store_terr
 }
 
 bool cli_verify(sqlite3 *db, const char *region, double eps, const char *terrain, const char *options,
-                cli_proof *proof) {
-    sqlite3_stmt *row = cli_prepare(db, "SELECT samples, vertices, triangles, max_error, rms_error, x, y, "
-                                        "t_junctions, overlaps, uncovered FROM rqt_verify(?1, ?2, ?3, ?4)");
-    if (!row) return false;
-    cli_bind_query(row, region, eps, terrain);
-    sqlite3_bind_text(row, 4, options, -1, SQLITE_STATIC);
-    const int code = sqlite3_step(row);
-    if (code == SQLITE_ROW) {
-        *proof = (cli_proof){.samples = sqlite3_column_int64(row, 0),
-                             .vertices = sqlite3_column_int64(row, 1),
-                             .triangles = sqlite3_column_int64(row, 2),
-                             .max_error = sqlite3_column_double(row, 3),
-                             .rms_error = sqlite3_column_double(row, 4),
-                             .has_worst = sqlite3_column_type(row, 5) != SQLITE_NULL,
-                             .x = sqlite3_column_double(row, 5),
-                             .y = sqlite3_column_double(row, 6),
-                             .t_junctions = sqlite3_column_int64(row, 7),
-                             .overlaps = sqlite3_column_int64(row, 8),
-                             .uncovered = sqlite3_column_int64(row, 9)};
-    } else if (code == SQLITE_DONE) {
-        cli_fail("rqt_verify() gave no row");
-    } else {
-        cli_fail_database(db);
-    }
-    sqlite3_finalize(row);
-    return code == SQLITE_ROW;
-}
-
-/* The promise: nowhere further than max(eps, quantum_error) from a sample of the source. The stored heights are
- * within quantum_error of the source's, and the mesh within eps - quantum_error of them, or exactly on them. The
- * verifier multiplies by a quantum that is itself rounded: an equality may be two units of the last place off. */
-bool cli_proof_holds(const cli_proof *proof, double eps, double quantum_error) {
-    const double allowed = fmax(eps - quantum_error, 0) * (1 + 0x1p-51);
-    return proof->max_error <= allowed && !proof->t_junctions && !proof->overlaps && !proof->uncovered;
+                picture_proof *proof) {
+    char *sentence = NULL;
+    const int code = picture_proof_read(db, region, eps, terrain, options, proof, &sentence);
+    return code == SQLITE_OK || cli_fail_store(code, sentence) == CLI_OK;
 }

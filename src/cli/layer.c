@@ -46,10 +46,11 @@ static bool write_srs(layer *l, const store_terrain *t) {
     const bool known = t->srid > 0;
     l->srs = !*t->crs && !known ? -1 : known ? t->srid : OWN_SRS;
     if (!*t->crs || l->srs < 0) return true;
-    return execute_made(l->out, sqlite3_mprintf("INSERT OR IGNORE INTO gpkg_spatial_ref_sys(srs_name, srs_id, "
-                                                "organization, organization_coordsys_id, definition) "
-                                                "VALUES(%Q, %d, %Q, %d, %Q)",
-                                                cli_crs_label(t), l->srs, known ? "EPSG" : "NONE", l->srs, t->crs));
+    return execute_made(l->out,
+                        sqlite3_mprintf("INSERT OR IGNORE INTO gpkg_spatial_ref_sys(srs_name, srs_id, "
+                                        "organization, organization_coordsys_id, definition) "
+                                        "VALUES(%Q, %d, %Q, %d, %Q)",
+                                        text_crs_label(t), l->srs, known ? "EPSG" : "NONE", l->srs, t->crs));
 }
 
 static bool begin(layer *l, const store_terrain *t, const char *path) {

@@ -11,12 +11,9 @@
 #include <stdio.h>
 #include <string.h>
 
-static const cli_command *const COMMANDS[] = {&command_import, &command_update, &command_info, &command_check,
-                                              &command_verify, &command_mesh,   &command_chart};
+static const cli_command *const COMMANDS[] = {&command_import, &command_update, &command_info,  &command_check,
+                                              &command_verify, &command_mesh,   &command_serve, &command_chart};
 enum { COMMAND_COUNT = sizeof COMMANDS / sizeof *COMMANDS };
-
-/* In the contract of the command line, and still to come. */
-static const char *const LATER[] = {"serve"};
 
 const cli_command *cli_current;
 
@@ -89,19 +86,19 @@ static const cli_command *find(const char *name) {
 }
 
 static int dispatch(int argc, char **argv) {
-    if (argc < 2) return cli_usage("a command is missing: import, update, info, check, verify, mesh or chart");
+    if (argc < 2)
+        return cli_usage("a command is missing: import, update, info, check, verify, mesh, serve or chart");
     const char *name = argv[1];
     if (!strcmp(name, "--help") || !strcmp(name, "-h") || (!strcmp(name, "help") && argc == 2))
         return help_of_all();
     if (!strcmp(name, "--version") || !strcmp(name, "-V") || !strcmp(name, "version")) return version();
     const bool help = !strcmp(name, "help");
     if (help) name = argv[2];
-    for (size_t i = 0; i < sizeof LATER / sizeof *LATER; i++)
-        if (!strcmp(name, LATER[i])) return cli_usage("the command %s is not in this version", name);
     const cli_command *command = find(name);
     if (!command)
-        return cli_usage("there is no %s %s: the commands are import, update, info, check, verify, mesh and chart",
-                         name[0] == '-' ? "option" : "command", name);
+        return cli_usage(
+            "there is no %s %s: the commands are import, update, info, check, verify, mesh, serve and chart",
+            name[0] == '-' ? "option" : "command", name);
     cli_current = command;
     char ask[] = "--help", *const asking[] = {argv[1], ask, NULL};
     return help ? command->run(2, (char **)asking) : command->run(argc - 1, argv + 1);

@@ -96,3 +96,18 @@ void cli_output_discard(cli_output *output) {
     unlink(output->temporary);
     watch_signals(false);
 }
+
+static bool put(void *context, const void *bytes, size_t size) {
+    return fwrite(bytes, 1, size, context) == size;
+}
+
+int cli_write_picture(sqlite3 *db, const picture_request *request, const cli_output *output) {
+    FILE *file = fopen(output->temporary, "wxe");
+    if (!file) return cli_fail("%s cannot be written: %s", output->path, strerror(errno));
+    char *sentence = NULL;
+    const int code = picture_write(db, request, put, file, &sentence);
+    const bool is_written = !ferror(file);
+    if (fclose(file) == 0 && is_written) return code == SQLITE_OK ? CLI_OK : cli_fail_store(code, sentence);
+    sqlite3_free(sentence);
+    return cli_fail("%s cannot be written: %s", output->path, strerror(errno));
+}

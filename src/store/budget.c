@@ -33,8 +33,12 @@ static int answer(store *s, const store_terrain *t, store_question *question, rq
     else
         code = store_query_computed(s, t, question, patch, reads, largest, error);
     if (code == SQLITE_OK && metric == RQT_METRIC_MINIMAL) show_infinite(patch);
-    if (code == SQLITE_OK && question->most > 0 && patch->vertex_count > question->most) question->over = true;
-    if (code == SQLITE_OK && question->over) {
+    /* Once more of the whole: the last block may have gone over. */
+    if (code == SQLITE_OK && !question->over && !question->too_large) (void)store_is_enough(s, question, patch);
+    if (code == SQLITE_OK && question->too_large && !question->over)
+        code = store_fail(error, SQLITE_TOOBIG, "the mesh has more than %lld triangles or vertices, the limit here",
+                          s->limits.triangles);
+    if (code == SQLITE_TOOBIG || question->over) {
         rqt_patch_free(patch);
         if (reads) store_reads_free(reads);
     }

@@ -41,6 +41,7 @@ struct store {
     rqt_codec *codec;
     struct method_cache *methods; /* what was computed, for one terrain; NULL: nothing */
     size_t method_memory;
+    store_limits limits;
 };
 
 /* Set *error to a sentence and return code (SQLITE_NOMEM when there is no memory for the sentence). terrain.c */
@@ -82,7 +83,10 @@ typedef struct store_question {
     const store_query_options *options;
     size_t most; /* vertices: with more, stop and say over; 0: any number */
     bool over;
+    bool too_large; /* more than the store's limits allow: stopped likewise */
 } store_question;
+/* Is the patch more than the question wants, or than the store's limits allow? It is noted which. query.c */
+bool store_is_enough(const store *s, store_question *question, const rqt_patch *patch);
 /* From the tables of t (metric is not looked at). query.c */
 int store_query_tables(store *s, const store_terrain *t, store_question *question, rqt_patch *patch,
                        store_reads *reads, char **error);

@@ -272,8 +272,7 @@ static const rqt_block *make_block(void *context, rqt_block_number number) {
 
 static bool is_interrupted(void *context) {
     computed *c = context;
-    c->question->over = c->question->most > 0 && c->patch->vertex_count > c->question->most;
-    return c->question->over || store_is_interrupted(c->store, &c->code);
+    return store_is_enough(c->store, c->question, c->patch) || store_is_interrupted(c->store, &c->code);
 }
 
 /* The blocks that meet the box and answer, as the index would find them. */
@@ -302,7 +301,7 @@ static size_t find_answers(const method *m, const store_terrain *t, const int32_
 int store_query_computed(store *s, const store_terrain *t, store_question *question, rqt_patch *patch,
                          store_reads *reads, rqt_code *largest, char **error) {
     const store_query_options *options = question->options;
-    question->over = false;
+    question->over = question->too_large = false;
     memset(patch, 0, sizeof *patch);
     if (reads) memset(reads, 0, sizeof *reads);
     method *m = NULL;
@@ -341,7 +340,7 @@ int store_query_computed(store *s, const store_terrain *t, store_question *quest
     const rqt_status status = rqt_query_run(&query, store_allocator(), patch);
     code =
         status == RQT_READ_FAILED || status == RQT_INTERRUPTED ? c.code : store_fail_core(error, status, "query");
-    if (code == SQLITE_OK && reads && !reads->rows && !question->over)
+    if (code == SQLITE_OK && reads && !reads->rows && !question->over && !question->too_large)
         code = store_begin_reads(&query, question->options->only_numbers, reads);
     if (code == SQLITE_OK && reads)
         /* NOLINTNEXTLINE(clang-analyzer-core.NullDereference): as many rows as are counted */

@@ -227,11 +227,20 @@ bool store_is_interrupted(store *s, int *why) {
     return true;
 }
 
+bool store_is_enough(const store *s, store_question *question, const rqt_patch *patch) {
+    const int64_t most = s->limits.triangles;
+    question->over = question->most > 0 && patch->vertex_count > question->most;
+    /* A strip has an index or two a triangle, and its triangles are not counted. */
+    question->too_large =
+        most > 0 && ((int64_t)patch->vertex_count > most || (int64_t)patch->triangle_count > most ||
+                     (int64_t)patch->strip_count / 3 > most);
+    return question->over || question->too_large;
+}
+
 static bool is_interrupted(void *context) {
     reading *r = context;
     /* More than is wanted already: the rest need not be walked. */
-    r->question->over = r->question->most > 0 && r->patch->vertex_count > r->question->most;
-    return r->question->over || store_is_interrupted(r->store, &r->code);
+    return store_is_enough(r->store, r->question, r->patch) || store_is_interrupted(r->store, &r->code);
 }
 
 void store_reads_free(store_reads *reads) {
@@ -243,7 +252,7 @@ int store_query_tables(store *s, const store_terrain *t, store_question *questio
                        store_reads *reads, char **error) {
     const store_query_options *options = question->options;
     const rqt_code code_eps = question->eps;
-    question->over = false;
+    question->over = question->too_large = false;
     memset(patch, 0, sizeof *patch);
     if (reads) memset(reads, 0, sizeof *reads);
     int32_t box[4];
@@ -280,7 +289,7 @@ int store_query_tables(store *s, const store_terrain *t, store_question *questio
         const rqt_status status = rqt_query_run(&query, store_allocator(), patch);
         code = status == RQT_READ_FAILED || status == RQT_INTERRUPTED ? r.code
                                                                       : store_fail_core(&sentence, status, "query");
-        if (code == SQLITE_OK && reads && !reads->rows && !question->over)
+        if (code == SQLITE_OK && reads && !reads->rows && !question->over && !question->too_large)
             code = store_begin_reads(&query, options->only_numbers, reads);
     }
     sqlite3_free(list.rows);

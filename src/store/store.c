@@ -47,6 +47,10 @@ int store_open(sqlite3 *db, store **out) {
     return SQLITE_OK;
 }
 
+store_limits *store_limits_of(store *s) {
+    return &s->limits;
+}
+
 sqlite3 *store_connection(const store *s) {
     return s->db;
 }

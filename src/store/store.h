@@ -116,6 +116,13 @@ int store_query_within(store *s, const store_terrain *t, const rqt_region *regio
 bool store_is_interrupted(store *s, int *code);
 /* Instead of rqt_patch_free: the store keeps the memory for its next query, up to a limit. */
 void store_keep(store *s, rqt_patch *patch);
+/* What one answer may be at most, for those who answer strangers: vertices and triangles, each, of a mesh; samples
+ * of a proof. 0: any number. Beyond it is SQLITE_TOOBIG with a sentence, and the walk has stopped at the block that
+ * went over. The store's own, to be changed at any time between calls. */
+typedef struct store_limits {
+    int64_t triangles, samples;
+} store_limits;
+store_limits *store_limits_of(store *s);
 /* Memory that a metric which is not stored may take, heights included. */
 #define STORE_METHOD_MEMORY ((size_t)512 << 20)
 void store_limit_methods(store *s, size_t bytes);

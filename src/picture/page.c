@@ -3,7 +3,7 @@
  * All sizes are for a page 1800 wide and grow with it. The same calls draw on an image (PNG) and on paper (SVG);
  * only the edges differ: as lines where there are few enough, so that they stay sharp in an SVG, else as an image.
  */
-#include "picture.h"
+#include "internal.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -92,9 +92,9 @@ static void write_text(cairo_t *cr, double x, double y, double align, double roo
 
 /* "71.5° W"; outside of what degrees usually are, the bare number. */
 static const char *degrees(double value, bool is_x, char text[48]) {
-    const char *number = cli_place(fabs(value), true);
+    const char *number = text_place(fabs(value), true);
     if (fabs(value) > (is_x ? 180 : 90))
-        snprintf(text, 48, "%s°", cli_place(value, true));
+        snprintf(text, 48, "%s°", text_place(value, true));
     else
         snprintf(text, 48, "%s° %s", number, is_x ? (value < 0 ? "W" : "E") : (value < 0 ? "S" : "N"));
     return text;
@@ -145,13 +145,13 @@ static void extent_text(const picture_page *page, char *text, size_t size) {
     const double width = fabs((x1 - x0) / p->dx) * w->across, height = fabs((y1 - y0) / p->dy) * w->down;
     char a[48], b[48], c[48], d[48], ground[120] = "";
     if (*t->crs && (width > 0 || height > 0))
-        snprintf(ground, sizeof ground, "   ·   %s × %s", cli_length(width), cli_length(height));
+        snprintf(ground, sizeof ground, "   ·   %s × %s", text_length(width), text_length(height));
     if (t->lonlat)
         snprintf(text, size, "%s – %s,  %s – %s%s", degrees(x0, true, a), degrees(x1, true, b),
                  degrees(y1, false, c), degrees(y0, false, d), ground);
     else
-        snprintf(text, size, "x %s – %s,  y %s – %s%s", cli_place(x0, false), cli_place(x1, false),
-                 cli_place(y1, false), cli_place(y0, false), ground);
+        snprintf(text, size, "x %s – %s,  y %s – %s%s", text_place(x0, false), text_place(x1, false),
+                 text_place(y1, false), text_place(y0, false), ground);
 }
 
 static void draw_legend(const picture_page *page, cairo_t *cr, double unit, double right) {
@@ -206,7 +206,7 @@ static void draw_header(const picture_page *page, cairo_t *cr, double unit) {
         snprintf(text, sizeof text, "%d × %d samples", t->lattice.width, t->lattice.height);
     if (*t->crs) {
         const size_t n = strlen(text);
-        snprintf(text + n, sizeof text - n, "   ·   %.80s", cli_crs_label(t));
+        snprintf(text + n, sizeof text - n, "   ·   %.80s", text_crs_label(t));
     }
     write_text(cr, left, (MARGIN + 82) * unit, 0, room, 17 * unit, false, text);
     draw_legend(page, cr, unit, right);
@@ -337,20 +337,20 @@ static void draw_scale(const picture_page *page, cairo_t *cr, double unit) {
 
 static void draw_caption(const picture_page *page, cairo_t *cr, const picture_mesh *mesh, double room,
                          double unit) {
-    const cli_proof *proof = &mesh->proof;
-    const bool holds = cli_proof_holds(proof, mesh->eps, page->terrain->quantum_error);
+    const picture_proof *proof = &mesh->proof;
+    const bool holds = picture_proof_holds(proof, mesh->eps, page->terrain->quantum_error);
     const double middle = page->window.panel_width / 2, y = page->window.panel_height;
     char text[200];
-    snprintf(text, sizeof text, "eps %s m", cli_real(mesh->eps));
+    snprintf(text, sizeof text, "eps %s m", text_real(mesh->eps));
     ink(cr, INK);
     write_text(cr, middle, y + 34 * unit, 0.5, room, 24 * unit, true, text);
-    snprintf(text, sizeof text, "%s %s   ·   %s %s", cli_count(proof->vertices),
-             proof->vertices == 1 ? "vertex" : "vertices", cli_count(proof->triangles),
+    snprintf(text, sizeof text, "%s %s   ·   %s %s", text_count(proof->vertices),
+             proof->vertices == 1 ? "vertex" : "vertices", text_count(proof->triangles),
              proof->triangles == 1 ? "triangle" : "triangles");
     write_text(cr, middle, y + 60 * unit, 0.5, room, 16.5 * unit, false, text);
     const double share = proof->samples ? 100.0 * (double)proof->vertices / (double)proof->samples : 0;
-    snprintf(text, sizeof text, "%.3g %% of %s samples   ·   %s %s m", share, cli_count(proof->samples),
-             holds ? "true error" : "BROKEN: true error", cli_metres(proof->max_error));
+    snprintf(text, sizeof text, "%.3g %% of %s samples   ·   %s %s m", share, text_count(proof->samples),
+             holds ? "true error" : "BROKEN: true error", text_metres(proof->max_error));
     ink(cr, holds ? SOFT : ALARM);
     write_text(cr, middle, y + 83 * unit, 0.5, room, 16.5 * unit, false, text);
 }

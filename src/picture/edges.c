@@ -6,7 +6,7 @@
  * builds up to dots where edges meet.
  */
 #define _GNU_SOURCE /* memmem */
-#include "picture.h"
+#include "internal.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -87,27 +87,30 @@ static bool collect(const model *m, const store_terrain *t, picture_mesh *mesh) 
     return mesh->edges != NULL;
 }
 
-bool picture_mesh_read(sqlite3 *db, const store_terrain *t, const char *region, double eps, const char *terrain,
-                       const char *options, picture_mesh *mesh) {
+int picture_mesh_read(sqlite3 *db, const store_terrain *t, const picture_request *r, double eps, picture_mesh *mesh,
+                      char **error) {
     *mesh = (picture_mesh){.eps = eps};
-    if (!cli_verify(db, region, eps, terrain, options, &mesh->proof)) return false;
-    sqlite3_stmt *row = cli_prepare(db, "SELECT rqt_mesh(?1, ?2, 'ply', ?3, ?4)");
-    if (!row) return false;
-    cli_bind_query(row, region, eps, terrain);
-    sqlite3_bind_text(row, 4, options, -1, SQLITE_STATIC);
-    bool ok = sqlite3_step(row) == SQLITE_ROW;
-    if (!ok) cli_fail_database(db);
-    if (ok) {
+    int code = picture_proof_read(db, r->region, eps, r->terrain, r->options, &mesh->proof, error);
+    if (code != SQLITE_OK) return code;
+    sqlite3_stmt *row = NULL;
+    if (sqlite3_prepare_v2(db, "SELECT rqt_mesh(?1, ?2, 'ply', ?3, ?4)", -1, &row, NULL) != SQLITE_OK)
+        return picture_fail_database(error, db);
+    sqlite3_bind_text(row, 1, r->region, -1, SQLITE_STATIC);
+    sqlite3_bind_double(row, 2, eps);
+    sqlite3_bind_text(row, 3, r->terrain, -1, SQLITE_STATIC);
+    sqlite3_bind_text(row, 4, r->options, -1, SQLITE_STATIC);
+    if (sqlite3_step(row) == SQLITE_ROW) {
         model m;
         const char *bytes = sqlite3_column_blob(row, 0);
-        ok = read_ply(bytes, (size_t)sqlite3_column_bytes(row, 0), &m);
-        if (!ok)
-            cli_fail("the mesh cannot be read");
-        else if (!(ok = collect(&m, t, mesh)))
-            cli_fail("out of memory");
+        if (!read_ply(bytes, (size_t)sqlite3_column_bytes(row, 0), &m))
+            code = picture_fail(error, "the mesh cannot be read");
+        else if (!collect(&m, t, mesh))
+            code = SQLITE_NOMEM;
+    } else {
+        code = picture_fail_database(error, db);
     }
     sqlite3_finalize(row);
-    return ok;
+    return code;
 }
 
 typedef struct canvas {
@@ -157,10 +160,7 @@ static double opacity_of(const canvas *c, const picture_mesh *mesh, const pictur
 
 bool picture_mesh_cover(picture_mesh *mesh, const picture_window *w, double width) {
     mesh->cover = cairo_image_surface_create(CAIRO_FORMAT_A8, w->pixel_width, w->pixel_height);
-    if (cairo_surface_status(mesh->cover) != CAIRO_STATUS_SUCCESS) {
-        cli_fail("out of memory");
-        return false;
-    }
+    if (cairo_surface_status(mesh->cover) != CAIRO_STATUS_SUCCESS) return false;
     const double sx = w->pixel_width / picture_span(w->cols), sy = w->pixel_height / picture_span(w->rows);
     double sum = 0;
     for (size_t i = 0; i < mesh->count; i++) {

@@ -6,7 +6,7 @@
  * is taken from the pixels' heights in metres of ground, and exaggerated so that a steep part of this window (its
  * 90th percentile) looks like 35 degrees: flat country and whole continents show their form, too.
  */
-#include "picture.h"
+#include "internal.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -60,8 +60,8 @@ static void average_row(const heights *h, const store_terrain *t, const int32_t 
     }
 }
 
-static bool read_heights(store *s, const store_terrain *t, const picture_window *w, heights *h,
-                         picture_relief *relief) {
+static int read_heights(store *s, const store_terrain *t, const picture_window *w, heights *h,
+                        picture_relief *relief, char **error) {
     const int across = w->cols / w->pixel_width, down = w->rows / w->pixel_height;
     h->step = across < down ? across : down;
     if (h->step < 1) h->step = 1;
@@ -73,15 +73,12 @@ static bool read_heights(store *s, const store_terrain *t, const picture_window 
     const size_t band = (size_t)cell_rows * (size_t)h->step * (size_t)w->cols;
     int32_t *q = malloc(band * sizeof *q);
     uint8_t *valid = malloc(band);
-    bool ok = h->z && q && valid;
-    if (!ok) cli_fail("out of memory");
-    for (int first = 0; ok && first < h->rows; first += cell_rows) {
+    int code = h->z && q && valid ? SQLITE_OK : SQLITE_NOMEM;
+    for (int first = 0; code == SQLITE_OK && first < h->rows; first += cell_rows) {
         const int32_t row = first * h->step, rest = w->rows - row;
         const int32_t rows = cell_rows * h->step < rest ? cell_rows * h->step : rest;
-        char *sentence = NULL;
-        const int code = store_window(s, t, w->col, w->row + row, w->cols, rows, q, valid, &sentence);
-        if (code != SQLITE_OK) ok = cli_fail_store(code, sentence) == CLI_OK;
-        for (int32_t at = 0; ok && at < rows; at += h->step) {
+        code = store_window(s, t, w->col, w->row + row, w->cols, rows, q, valid, error);
+        for (int32_t at = 0; code == SQLITE_OK && at < rows; at += h->step) {
             const size_t skip = (size_t)at * (size_t)w->cols;
             average_row(h, t, q + skip, valid + skip, w->cols, rows - at < h->step ? rows - at : h->step,
                         h->z + (size_t)((row + at) / h->step) * (size_t)h->columns, relief);
@@ -89,7 +86,7 @@ static bool read_heights(store *s, const store_terrain *t, const picture_window 
     }
     free(q);
     free(valid);
-    return ok;
+    return code;
 }
 
 static float cell(const heights *h, int column, int row) {
@@ -235,23 +232,23 @@ static void paint(const float *z, const picture_window *w, const picture_relief 
         }
 }
 
-bool picture_relief_make(store *s, const store_terrain *t, const picture_window *w, picture_relief *relief) {
+int picture_relief_make(store *s, const store_terrain *t, const picture_window *w, picture_relief *relief,
+                        char **error) {
     heights h = {0};
     *relief = (picture_relief){0};
     float *z = NULL;
-    bool ok = read_heights(s, t, w, &h, relief);
-    if (ok) {
+    int code = read_heights(s, t, w, &h, relief, error);
+    if (code == SQLITE_OK) {
         z = pixel_heights(&h, w);
         relief->image = cairo_image_surface_create(CAIRO_FORMAT_RGB24, w->pixel_width, w->pixel_height);
-        ok = z && cairo_surface_status(relief->image) == CAIRO_STATUS_SUCCESS;
-        if (!ok) cli_fail("out of memory");
+        if (!z || cairo_surface_status(relief->image) != CAIRO_STATUS_SUCCESS) code = SQLITE_NOMEM;
     }
-    if (ok) {
+    if (code == SQLITE_OK) {
         paint(z, w, relief, cairo_image_surface_get_data(relief->image),
               cairo_image_surface_get_stride(relief->image));
         cairo_surface_mark_dirty(relief->image);
     }
     free(z);
     free(h.z);
-    return ok;
+    return code;
 }

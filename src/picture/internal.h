@@ -1,16 +1,24 @@
-/* picture.h - the parts of a picture: window, relief, mesh, page.
+/* internal.h - the parts of a picture: window, relief, mesh, page.
  *
- *   picture.c  gathers: the window, the heights, a mesh and its proof for each eps; and writes the file
+ *   picture.c  gathers: the window, the heights, a mesh and its proof for each eps; and writes the bytes
+ *   proof.c    what rqt_verify says
  *   relief.c   heights -> tinted, shaded pixels
  *   edges.c    mesh -> its edges, each once, and their coverage of pixels
  *   page.c     draws it all with cairo, the same for PNG and SVG
  */
-#ifndef RQT_PICTURE_H
-#define RQT_PICTURE_H
+#ifndef RQT_PICTURE_INTERNAL_H
+#define RQT_PICTURE_INTERNAL_H
 
-#include "cli.h"
+#include "picture.h"
+#include "store.h"
+#include "text.h"
 
 #include <cairo.h>
+
+/* A sentence into *error; returns SQLITE_ERROR, or SQLITE_NOMEM. proof.c */
+int picture_fail(char **error, const char *format, ...) __attribute__((format(printf, 2, 3)));
+/* The same out of the connection's last failure; returns its code. */
+int picture_fail_database(char **error, sqlite3 *db);
 
 /* The window of the raster that a panel shows, from the first sample's centre to the last one's, and its size on
  * the page (panel units) and in pixels (of images: relief and coverage). */
@@ -33,8 +41,9 @@ typedef struct picture_relief {
     double low, high;       /* metres: the samples shown */
 } picture_relief;
 
-/* Reads the samples of the window and paints them. False after a sentence. */
-bool picture_relief_make(store *s, const store_terrain *t, const picture_window *window, picture_relief *relief);
+/* Reads the samples of the window and paints them. */
+int picture_relief_make(store *s, const store_terrain *t, const picture_window *window, picture_relief *relief,
+                        char **error);
 /* The tint of a share 0..1 between low and high, as red, green, blue 0..1. */
 void picture_tint(double share, double rgb[3]);
 extern const double picture_void_rgb[3];
@@ -45,7 +54,7 @@ typedef struct picture_edge {
 
 typedef struct picture_mesh {
     double eps;
-    cli_proof proof;
+    picture_proof proof;
     picture_edge *edges;
     size_t count;
     int32_t box[4];         /* samples: first and last column, first and last row; only when there are edges */
@@ -54,10 +63,10 @@ typedef struct picture_mesh {
     double line_share;      /* of the full line width, less for dense meshes */
 } picture_mesh;
 
-/* The edges of the answer of rqt_mesh() over terrain t, which `terrain` names. False after a sentence. */
-bool picture_mesh_read(sqlite3 *db, const store_terrain *t, const char *region, double eps, const char *terrain,
-                       const char *options, picture_mesh *mesh);
-/* Their coverage with lines of `width` pixels, and the opacity that goes with it. */
+/* The edges of the answer of rqt_mesh() over terrain t, and their proof. */
+int picture_mesh_read(sqlite3 *db, const store_terrain *t, const picture_request *r, double eps, picture_mesh *mesh,
+                      char **error);
+/* Their coverage with lines of `width` pixels, and the opacity that goes with it; false without memory. */
 bool picture_mesh_cover(picture_mesh *mesh, const picture_window *window, double width);
 
 typedef struct picture_page {
