@@ -24,8 +24,9 @@ IMPORT = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/import/*.c))
 PICTURE = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/picture/*.c src/text/*.c))
 SERVE = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/serve/*.c)) $(BUILD)/generated/web_files.o
 CLI = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/cli/*.c))
-# What the query service has in it: the page, and what it says of itself.
-WEB_FILES = $(wildcard src/serve/web/*) src/serve/openapi.json
+# What the query service has in it: the page, and what it says of itself. The page is the same in every build.
+WEB = build/web
+WEB_FILES = $(WEB)/index.html $(WEB)/viewer.css $(WEB)/viewer.js $(WEB)/decoder.js src/serve/openapi.json
 GENERATED = $(BUILD)/generated/schema_sql.h
 
 LIBS_CORE = -lzstd -lm
@@ -37,6 +38,7 @@ CAIRO_CFLAGS = $(shell pkg-config --cflags cairo libpng 2>/dev/null)
 .PHONY: all
 all: ## build the command and the extension: build/rqt and build/rqt.so
 	@./src/install-packages.sh build
+	@./src/install-packages.sh web || echo "No node and npm: rqt serve goes without its viewer" >&2
 	@$(MAKE) --no-print-directory -j2 products
 	@echo "$(BUILD)/rqt and $(BUILD)/rqt.so are ready"
 
@@ -72,6 +74,9 @@ $(BUILD)/picture/%.o: src/picture/%.c
 $(BUILD)/serve/%.o: src/serve/%.c
 	@mkdir -p $(@D)
 	@echo "  compile $<"; $(CC) $(CFLAGS) $(INCLUDES) -DSQLITE_CORE -c $< -o $@
+$(WEB)/viewer.js: $(wildcard src/web/*) src/web/.npmrc
+	@echo "  bundle $@"; ./src/web/bundle.sh $(WEB) build/web-packages
+$(filter-out $(WEB)/viewer.js,$(filter $(WEB)/%,$(WEB_FILES))): $(WEB)/viewer.js ;
 $(BUILD)/generated/web_files.c: src/serve/embed.sh $(WEB_FILES)
 	@mkdir -p $(@D)
 	@./src/serve/embed.sh $(WEB_FILES) > $@
