@@ -78,7 +78,8 @@ typedef enum request_mode { REQUEST_COVER, REQUEST_SNAP, REQUEST_BORDER, REQUEST
 /* region, eps, terrain, options, as every mesh function takes them. request.c */
 typedef enum frame_kind { FRAME_CRS, FRAME_ECEF, FRAME_ENU } frame_kind; /* in the order of options.c */
 typedef struct space_frame space_frame;
-typedef struct view view; /* view.h */
+typedef struct view view;                                          /* view.h */
+typedef enum view_cover { VIEW_PICTURE, VIEW_TERRAIN } view_cover; /* in the order of options.c */
 typedef struct request {
     connection *connection; /* held while the request lives */
     store *store;
@@ -88,18 +89,20 @@ typedef struct request {
     request_mode mode;
     double eps;
     store_query_options options;
-    struct cJSON *detail;      /* the option, as it came; NULL: none */
-    places *places;            /* what it says; detail.c */
-    frame_kind frame_kind;     /* where the mesh is drawn */
-    space_frame *frame;        /* NULL for FRAME_CRS; frame.c */
-    bool fans;                 /* the strip goes round the centres of blocks */
-    int64_t max_vertices;      /* 0: any number */
-    int64_t max_triangles;     /* of a view; 0: any number */
-    char *previous;            /* of a view: "", or the token of the last answer; NULL: there is no next one */
-    rqt_view_test test;        /* of a view */
-    bool has_test, has_metric; /* the options name one */
+    struct cJSON *detail;  /* the option, as it came; NULL: none */
+    places *places;        /* what it says; detail.c */
+    frame_kind frame_kind; /* where the mesh is drawn */
+    space_frame *frame;    /* NULL for FRAME_CRS; frame.c */
+    bool fans;             /* the strip goes round the centres of blocks */
+    int64_t max_vertices;  /* 0: any number */
+    int64_t max_triangles; /* of a view; 0: any number */
+    char *previous;        /* of a view: "", or the token of the last answer; NULL: there is no next one */
+    rqt_view_test test;    /* of a view */
+    view_cover cover;      /* of a view: what the answer covers */
+    bool has_test, has_cover, has_metric; /* the options name one */
     double achieved_eps; /* of the mesh: eps, or more to keep within max_vertices; known after request_patch */
-    view *view; /* NULL, or the view that is asked for: then the region is what may be seen, and eps is infinite */
+    view *
+        view; /* NULL, or the view that is asked for: then the region is what its cover says, and eps is infinite */
 } request;
 
 /* `usual` is the mode when the options name none. */

@@ -109,7 +109,7 @@ int view_settle(request *r, view_wants wants, char **error);
 void view_free(view *v); /* NULL is fine */
 
 /* The view's field, of its camera, band and achieved_tau; and the request's region, the squares in which something
- * may be drawn. view_field.c */
+ * may be drawn, or all of the terrain (option cover). view_field.c */
 int view_field(request *r, char **error);
 /* How far the nearest piece of terrain that is drawn is from the eye, about; 0 when there is none. view_field.c */
 int view_nearest(request *r, double *nearest, char **error);
