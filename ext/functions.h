@@ -121,8 +121,8 @@ int request_patch(request *r, rqt_product product, rqt_patch *patch, store_reads
 int request_cut(request *r, rqt_cut *cut, char **error);
 /* SQLITE_OK in any other mode; else a sentence that what is asked for cannot hold the answer. cut.c */
 int request_refuse_cut(const request *r, const char *what, char **error);
-/* The patch in wire format, with normals or without. delta.c */
-int wire_mesh(request *r, bool normals, uint8_t **bytes, size_t *size, char **error);
+/* The patch in wire format, with normals and errors or without. delta.c */
+int wire_mesh(request *r, bool normals, bool errors, uint8_t **bytes, size_t *size, char **error);
 void request_free(request *r);
 /* A geometry of the request as a region; `what` it is, for sentences. On a terrain in degrees it is one on every
  * turn that meets the terrain, for longitudes are the same modulo 360: the geometry gets more members. */
