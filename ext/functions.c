@@ -95,7 +95,8 @@ const function rqt_functions[] = {
      .returns = "BLOB, TEXT for obj",
      .purpose = "The mesh of a region as a file's bytes; format: strip, indexed, rqt (src/core/FORMAT.md; rqt "
                 "takes about a byte a vertex), obj, ply, wkb, gpkg, spatialite; ply+normals, rqt+normals: with the "
-                "terrain's normal at every vertex, from the full-resolution samples around it. Of mode cut and "
+                "terrain's normal at every vertex, from the full-resolution samples around it; rqt+errors, "
+                "rqt+normals+errors: with what rqt_range has in its column error. Of mode cut and "
                 "frames only obj, ply, wkb, gpkg, spatialite.",
      .example = "SELECT length(rqt_mesh(" SUMMIT ", 10, 'ply'))",
      .call = call_mesh,

@@ -138,8 +138,8 @@ typedef struct mesh_told {
 int request_tell(request *r, const rqt_patch *patch, mesh_told *told, char **error);
 int told_columns(bool is_view);
 void put_told(const mesh_told *told, int column, sqlite3_context *result);
-/* The patch in wire format, with normals or without. delta.c */
-int wire_mesh(request *r, bool normals, mesh_told *told, uint8_t **bytes, size_t *size, char **error);
+/* The patch in wire format, with normals and errors or without. delta.c */
+int wire_mesh(request *r, bool normals, bool errors, mesh_told *told, uint8_t **bytes, size_t *size, char **error);
 /* A mesh as the bytes of a file. */
 typedef struct mesh_bytes {
     uint8_t *bytes; /* to be released with sqlite3_free */

@@ -155,22 +155,32 @@ static int cut_format(request *r, format_kind kind, mesh_told *told, uint8_t **b
 typedef struct mesh_format {
     enum { MESH_STRIP, MESH_INDEXED, MESH_WIRE, MESH_INCREMENT, MESH_OTHER } family;
     format_kind kind; /* of MESH_OTHER */
-    bool normals;
-    char name[16]; /* without "+normals"; cut where it is none of ours */
+    bool normals, errors;
+    char name[16]; /* without them; cut where it is none of ours */
 } mesh_format;
 
-#define KNOWN " strip indexed rqt obj ply wkb gpkg spatialite ply+normals rqt+normals, and increment of views"
+#define KNOWN                                                                                                    \
+    " strip indexed rqt obj ply wkb gpkg spatialite ply+normals rqt+normals rqt+errors rqt+normals+errors, and " \
+    "increment of views"
+
+/* Does the text end so, after something else? Then it is shortened by that. */
+static bool take_suffix(const char *text, size_t *length, const char *suffix) {
+    const size_t n = strlen(suffix);
+    if (*length <= n || memcmp(text + *length - n, suffix, n) != 0) return false;
+    *length -= n;
+    return true;
+}
 
 static int read_format(sqlite3_value *value, mesh_format *f, char **error) {
     static const char *const own[] = {"strip", "indexed", "rqt", "increment"};
-    static const char with_normals[] = "+normals";
     if (sqlite3_value_type(value) != SQLITE_TEXT) return fail(error, "format must be a text: one of%s", KNOWN);
     const char *text = (const char *)sqlite3_value_text(value);
     if (!text) return SQLITE_NOMEM;
-    const size_t length = strlen(text), suffix = sizeof with_normals - 1;
-    const bool normals = length > suffix && strcmp(text + length - suffix, with_normals) == 0;
-    *f = (mesh_format){MESH_OTHER, FORMAT_OBJ, normals, ""};
-    sqlite3_snprintf(sizeof f->name, f->name, "%.*s", (int)(normals ? length - suffix : length), text);
+    size_t length = strlen(text);
+    *f = (mesh_format){.family = MESH_OTHER, .kind = FORMAT_OBJ};
+    f->errors = take_suffix(text, &length, "+errors");
+    f->normals = take_suffix(text, &length, "+normals");
+    sqlite3_snprintf(sizeof f->name, f->name, "%.*s", (int)length, text);
     for (int i = 0; i < 4; i++)
         if (strcmp(f->name, own[i]) == 0) f->family = i;
     if (strcmp(f->name, "glb") == 0) return fail(error, "format \"%s\" is not in this version", text);
@@ -178,6 +188,8 @@ static int read_format(sqlite3_value *value, mesh_format *f, char **error) {
         return fail(error, "unknown format \"%s\"; there are%s", text, KNOWN);
     if (f->normals && f->family != MESH_WIRE && f->kind != FORMAT_PLY)
         return fail(error, "format \"%s\" has no normals; ply and rqt have", f->name);
+    if (f->errors && f->family != MESH_WIRE)
+        return fail(error, "format \"%s\" has no errors of vertices; rqt has", f->name);
     return SQLITE_OK;
 }
 
@@ -214,12 +226,14 @@ static int make_mesh(request *r, const mesh_format *f, mesh_bytes *out, char **e
         return fail(error, "normals are those of the terrain's CRS: option \"frame\" must be crs");
     if (f->family != MESH_OTHER || f->normals) {
         char what[60];
-        sqlite3_snprintf(sizeof what, what, "format \"%s%s\"", f->name, f->normals ? "+normals" : "");
+        sqlite3_snprintf(sizeof what, what, "format \"%s%s%s\"", f->name, f->normals ? "+normals" : "",
+                         f->errors ? "+errors" : "");
         const int code = request_refuse_cut(r, what, error);
         if (code != SQLITE_OK) return code;
     }
     if (f->family == MESH_INCREMENT) return view_increment(r, &out->told, &out->bytes, &out->size, error);
-    if (f->family == MESH_WIRE) return wire_mesh(r, f->normals, &out->told, &out->bytes, &out->size, error);
+    if (f->family == MESH_WIRE)
+        return wire_mesh(r, f->normals, f->errors, &out->told, &out->bytes, &out->size, error);
     if (r->mode == REQUEST_CUT) return cut_format(r, f->kind, &out->told, &out->bytes, &out->size, error);
     return patch_mesh(r, f, &out->told, &out->bytes, &out->size, error);
 }
@@ -227,7 +241,7 @@ static int make_mesh(request *r, const mesh_format *f, mesh_bytes *out, char **e
 int mesh_bytes_make(connection *c, bool is_view, sqlite3_value **arguments, mesh_bytes *out, char **error) {
     sqlite3_value *const *format = arguments + (is_view ? 1 : 2), *terrain = format[1], *options = format[2];
     request r = {0};
-    mesh_format f = {MESH_OTHER, FORMAT_OBJ, false, ""};
+    mesh_format f = {.family = MESH_OTHER, .kind = FORMAT_OBJ};
     *out = (mesh_bytes){.is_text = false};
     int code = read_format(format[0], &f, error);
     if (code == SQLITE_OK)

@@ -28,6 +28,8 @@ static const mesh_format FORMATS[] = {
     {"geojson", "application/geo+json", SHAPE_FEATURES, false},
     {"rqt", "application/vnd.rqt.mesh", SHAPE_BYTES, true},
     {"rqt+normals", "application/vnd.rqt.mesh", SHAPE_BYTES, true},
+    {"rqt+errors", "application/vnd.rqt.mesh", SHAPE_BYTES, true},
+    {"rqt+normals+errors", "application/vnd.rqt.mesh", SHAPE_BYTES, true},
     {"glb", "model/gltf-binary", SHAPE_BYTES, false},
     {"obj", "model/obj", SHAPE_BYTES, false},
     {"ply", "application/x-ply", SHAPE_BYTES, false},
