@@ -182,7 +182,7 @@ coverage: ## the test programs in a build that counts: the core's lines, 100 % b
 # What runs on several threads: readers beside a writer, the import's reader and workers, which work on sweeps and builds;
 # and the query service's workers.
 THREADED = test_fault_threads
-.PHONY: test-threads test-serve
+.PHONY: test-threads test-serve test-web
 test-threads: ## what runs on several threads, under ThreadSanitizer
 	@./src/install-packages.sh build test
 	@$(MAKE) --no-print-directory -j2 products
@@ -197,6 +197,11 @@ test-serve: ## the query service's tests, plain and under ASan and UBSan
 	  SANITIZE="-fsanitize=address,undefined -fno-sanitize-recover=undefined" $(BUILD)/sanitized/rqt
 	@RQT=$(CURDIR)/$(BUILD)/rqt RQT_SO=$(CURDIR)/$(BUILD)/rqt.so ./tests/test_serve.sh | grep -v '^ok'
 	@ASAN_OPTIONS=detect_leaks=1 LSAN_OPTIONS=suppressions=$(CURDIR)/tests/leaks.supp:print_suppressions=0 RQT_HOSTILE_MIB=1024 RQT=$(CURDIR)/$(BUILD)/sanitized/rqt RQT_SO=$(CURDIR)/$(BUILD)/rqt.so ./tests/test_serve.sh | grep -v '^ok'
+
+test-web: ## the page in headless Chromium, and its modules in node; pictures in build/web-shots
+	@./src/install-packages.sh build test web browser
+	@$(MAKE) --no-print-directory -j2 products
+	@BUILD=$(BUILD) ./tests/web/run.sh
 
 # clang's libFuzzer steers by what code an input reaches; what it finds stays in build/fuzz/NAME.
 SECONDS ?= 60
