@@ -1,8 +1,9 @@
-"""Mutants of regions of squares (src/core/region_squares.c): see ../mutants.py."""
+"""Mutants of regions of squares (src/core/region_squares.c), and of choosing among squares that are not cut: see ../mutants.py."""
 
 BOXES = "boxes_lie_to_squares_as_cells_are_counted"
 TRIANGLES = "triangles_belong_to_squares_as_to_the_polygon_of_their_cells"
 TOUCH = "what_touches_squares_and_is_in_them_is_what_cells_say"
+CHOSEN = "what_is_chosen_in_a_block_is_what_rules_select"
 REFUSED = "squares_that_are_none_or_out_of_order_are_refused"
 FILE = "src/core/region_squares.c"
 REGION = "src/core/region.c"
@@ -33,4 +34,12 @@ MUTANTS = [
     ("squares: touching is overlapping", REGION, "clamp_sample(-floor_sample(-box->x0) - 1, end)", "clamp_sample(-floor_sample(-box->x0), end)",
      "test_core_squares", TOUCH),
     ("squares: mode cut takes them", "src/core/cut.c", "    if (!region_has_border(region)) return RQT_INVALID;\n", "", "test_core_squares", "mode_cut_refuses_squares"),
+    ("squares: a middle of a side among leaves has one quarter's codes", "src/core/rule_choose.c", "{{lesser(two[0], two[1]), ", "{{two[0], ",
+     "test_core_field", CHOSEN),
+    ("squares: around a quarter among leaves the same column is there twice", "src/core/rule_choose.c", "const int x = i & 1 ? 0 : 1,", "const int x = i & 1 ? 1 : 0,",
+     "test_core_field", CHOSEN),
+    ("squares: nine of which some are cut are leaves", "src/core/field.c", "cut |= n->kind == SPLIT;", "cut = n->kind == SPLIT;",
+     "test_core_field", CHOSEN),
+    ("squares: a rule that lowers takes codes as they are", "src/core/rule.c", "return !rule->lowers && !(rule->quantum_error > 0);", "return !(rule->quantum_error > 0);",
+     "test_core_field", CHOSEN),
 ]
