@@ -107,6 +107,21 @@ static void check_any_codes(const answer *a) {
     free(other.vertices);
 }
 
+/* It has none and takes none, not even those of the mesh that it ends in. */
+static void check_increment(const answer *fine, const answer *coarse) {
+    blob delta = encode(fine, coarse), mesh = encode(fine, NULL);
+    const size_t without = mesh.size, before = delta.size;
+    assert_int_equal(add(&delta, &fine->patch), RQT_INVALID);
+    assert_int_equal(add(&mesh, &fine->patch), RQT_OK);
+    uint8_t *longer = realloc(delta.bytes, before + mesh.size - without);
+    if (!longer) abort();
+    memcpy(longer + before, mesh.bytes + without, mesh.size - without);
+    delta = (blob){longer, before + mesh.size - without};
+    check_corrupt(&delta, delta.size, 2, "errors of an increment");
+    free(delta.bytes);
+    free(mesh.bytes);
+}
+
 static void errors_come_back_beside_an_unchanged_mesh(void **state) {
     (void)state;
     random_begin("errors");
@@ -125,10 +140,7 @@ static void errors_come_back_beside_an_unchanged_mesh(void **state) {
             check_all(&fine);
             check_all(&rough);
             check_any_codes(&fine);
-            blob delta = encode(&fine, &coarse); /* has none, and takes none */
-            assert_int_equal(add(&delta, &fine.patch), RQT_INVALID);
-            check_corrupt(&delta, delta.size, 2, "errors of an increment");
-            free(delta.bytes);
+            check_increment(&fine, &coarse);
             answer_free(&rough);
             answer_free(&coarse);
             answer_free(&fine);
@@ -192,6 +204,9 @@ static void sample_free(sample *s) {
 static void check_plain(const sample *s, const uint8_t *plain, size_t size, rqt_status expected, const char *what) {
     blob b = with_errors(&s->with, s->mesh, plain, size);
     const rqt_status status = decode_status(&b);
+    rqt_wire_header header;
+    if (size > s->head + 2 * s->count) /* the header alone shows it */
+        CHECK(rqt_wire_info(b.bytes, b.size, &header, NULL) == RQT_CORRUPT, "%s: info", what);
     CHECK(status == expected, "%s: status %d", what, (int)status);
     free(b.bytes);
 }

@@ -1,5 +1,5 @@
-/* fuzz_wire.c - meshes as bytes, 'rqt' with normals and errors or without, and increments, 'strip' and 'indexed': those of
- * queries come back as they were; damaged ones, signed again, inside and outside the compressed frame, and any
+/* fuzz_wire.c - meshes as bytes, 'rqt' with normals and errors or without, increments, 'strip' and 'indexed': those
+ * of queries come back as they were; damaged ones, signed again, inside and outside the compressed frame, and any
  * bytes, are refused or are meshes. */
 #include "fuzz_terrain.h"
 
@@ -179,7 +179,8 @@ static void read_errors(const wire *with, const rqt_allocator *a, fuzz_heap *h) 
     rqt_patch patch = {0};
     rqt_message why;
     if (went_well(rqt_wire_decode(with->bytes, with->size, true, a, &header, &patch, &why), h)) {
-        HOLD(header.has_errors && patch.vertex_count == with->patch.vertex_count, "%zu vertices", patch.vertex_count);
+        HOLD(header.has_errors && patch.vertex_count == with->patch.vertex_count, "%zu vertices",
+             patch.vertex_count);
         for (size_t i = 0; i < patch.vertex_count; i++)
             HOLD(patch.vertices[i].error == with->patch.vertices[i].error, "vertex %zu: code %d, had %d", i,
                  patch.vertices[i].error, with->patch.vertices[i].error);
@@ -187,7 +188,8 @@ static void read_errors(const wire *with, const rqt_allocator *a, fuzz_heap *h) 
     rqt_patch_free(&patch);
 }
 
-/* Errors behind a mesh, some of them as no terrain has them; damaged, plain or compressed, they are refused or read. */
+/* Errors behind a mesh, some of them as no terrain has them; damaged, plain or compressed, they are refused or
+ * read. */
 static void add_errors(input *in, const wire *w, const rqt_allocator *a, fuzz_heap *h) {
     const size_t n = w->patch.vertex_count, bound = w->size + rqt_wire_errors_bound(n);
     wire with = {.patch = w->patch, .bytes = malloc(bound), .size = w->size};
