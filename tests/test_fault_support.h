@@ -112,7 +112,7 @@ static const char *const further_statements[] = {
     "SELECT rqt_mesh(rqt_bbox(-71.4, 44.2, -71.3, 44.3), 30, 'obj', NULL, '{\"frame\":\"ecef\"}')",
     "SELECT * FROM rqt_range(rqt_bbox(-71.4, 44.2, -71.3, 44.3), 30, NULL, '{\"frame\":\"enu\"}')",
     "SELECT rqt_mesh(rqt_bbox(-71.4, 44.2, -71.3, 44.3), 30, 'ply+normals')",
-    "SELECT rqt_mesh(rqt_bbox(-71.4, 44.2, -71.3, 44.3), 30, 'rqt+normals')",
+    "SELECT rqt_mesh(rqt_bbox(-71.4, 44.2, -71.3, 44.3), 30, 'rqt+normals+errors')",
 };
 
 static inline int statement_count(void) {

@@ -31,7 +31,8 @@ ask = service.ask
 s.check("the service says where it listens, on this machine alone", re.fullmatch(r"http://127\.0\.0\.1:\d+/", service.url), service.url)
 
 # ------------------------------------------------------------------------------------------- meshes, byte for byte
-TYPES = {"rqt": "application/vnd.rqt.mesh", "rqt+normals": "application/vnd.rqt.mesh", "obj": "model/obj", "ply": "application/x-ply",
+TYPES = {"rqt": "application/vnd.rqt.mesh", "rqt+normals": "application/vnd.rqt.mesh", "rqt+errors": "application/vnd.rqt.mesh",
+         "rqt+normals+errors": "application/vnd.rqt.mesh", "obj": "model/obj", "ply": "application/x-ply",
          "ply+normals": "application/x-ply", "strip": "application/vnd.rqt.strip", "indexed": "application/vnd.rqt.indexed",
          "wkb": "application/vnd.rqt.wkb"}
 TYPES.update((name, "model/gltf-binary") for name in ("glb", "glb+normals", "glb+quantized", "glb+quantized+normals"))
