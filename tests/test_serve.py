@@ -114,6 +114,7 @@ for step in range(3):
           (200, "application/vnd.rqt.increment", *expected))
     token = answer.rqt_token
     steps.append(len(answer.body))
+equal("which is packed already", ask(HILLS + "/view", {"camera": CAMERA, "f": "increment", "previous": ""}, headers={"Accept-Encoding": "gzip"}).content_encoding, None)
 equal("which are few where nothing changes", steps[1:], [48, 48])
 check("increments are of views", 'format "increment" is for views' in ask(HILLS + "/range?eps=1&f=increment").detail())
 answer = ask(HILLS + "/view", {"camera": CAMERA})

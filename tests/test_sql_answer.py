@@ -11,6 +11,13 @@ from sql_support import check, equal, one, raises, rows
 BASE = s.temp("answer.gpkg")
 s.import_terrain(BASE, s.write_grid(s.temp("hills.asc"), s.rough_grid(130, 97, 7, voids=20), cell=10), name="hills", block=4)
 s.import_terrain(BASE, s.DATA + "/etopo1_1deg.tif", name="globe", block=4)
+FEET = ('PROJCS["NAD27 / California zone I",GEOGCS["NAD27",DATUM["North_American_Datum_1927",SPHEROID["Clarke 1866",6378206.4,294.978698213898]],'
+        'PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]],PROJECTION["Lambert_Conformal_Conic_2SP"],PARAMETER["latitude_of_origin",39.33],'
+        'PARAMETER["central_meridian",-122],PARAMETER["standard_parallel_1",41.66],PARAMETER["standard_parallel_2",40],'
+        'PARAMETER["false_easting",2000000],PARAMETER["false_northing",0],UNIT["US survey foot",0.304800609601219]]')
+s.import_terrain(BASE, s.write_grid(s.temp("feet.asc"), s.rough_grid(33, 33, 7), crs=FEET), name="feet", block=4)
+CLARKE = 'GEOGCS["NAD27",DATUM["North_American_Datum_1927",SPHEROID["Clarke 1866",6378206.4,294.978698213898]],PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]]'
+s.import_terrain(BASE, s.write_grid(s.temp("clarke.asc"), s.rough_grid(33, 33, 7), x0=-100, y0=40, cell=0.01, crs=CLARKE), name="clarke", block=4)
 db = s.connect(BASE)
 FORMATS = ("strip", "indexed", "rqt", "rqt+normals", "obj", "ply", "ply+normals", "wkb", "gpkg", "spatialite")
 FREE = ("obj", "ply", "wkb", "gpkg", "spatialite")  # of meshes whose vertices are no samples
@@ -105,5 +112,6 @@ except sqlite3.Error as error:
     check("of views, too", "rqt_view_answer(): the mesh has more than 100 triangles" in str(error), error)
 equal("lonlat, metre, semi_major, inverse_flattening, crs_name", rows(
     db, "SELECT name, lonlat, metre, semi_major, inverse_flattening, crs_name FROM rqt_terrains ORDER BY name"),
-    [("globe", 1, None, 6378137.0, 298.257223563, "WGS 84"), ("hills", 0, 1.0, None, None, None)])
+    [("clarke", 1, None, 6378206.4, 294.978698213898, "NAD27"), ("feet", 0, 1200 / 3937, None, None, "NAD27 / California zone I"),
+     ("globe", 1, None, 6378137.0, 298.257223563, "WGS 84"), ("hills", 0, 1.0, None, None, None)])
 s.finish()

@@ -119,6 +119,8 @@ for test in ("ulrich", "node", "sphere", "lindstrom", "lodmap"):
     found = triangles(view, "whole", cover="terrain", test=test)
     check("test %s covers it, too" % test, triangles(view, "whole", test=test) <= found and is_whole(found)
           and half_cells(found, "whole") == 2 * 149 * 96, len(found))
+    equal("what a test of the literature promises (%s)" % test, one(db, "SELECT guaranteed FROM rqt_view_answer(?, 'rqt', 'whole', ?)", view,
+                                                                    options("terrain", test=test)), 0)
 closed = rows(db, "SELECT x0, y0, z0, x1, y1, z1, x2, y2, z2 FROM rqt_view_triangles(?, 'globe', '{\"frame\":\"ecef\",\"cover\":\"terrain\"}')", VIEWS["globe"][0])
 edges = {}
 for r in closed:
