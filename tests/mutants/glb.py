@@ -3,7 +3,7 @@
 FORMAT, MODEL, C, SQL = "src/format/glb.c", "ext/model.c", "test_format_glb", "test_sql_glb.py"
 MUTANTS = [
     ("glb: north is along +z", FORMAT, "model[2] = (origin[1] - xyz[1])", "model[2] = (xyz[1] - origin[1])", SQL, "is within what it says"),
-    ("glb: no origin", FORMAT, "m->is_about_place ? 0 : choose_origin", "true ? 0 : choose_origin", SQL, "is off by a float's rounding at most"),
+    ("glb: no origin", FORMAT, "m->is_about_place ? 0 : choose_origin", "true ? 0 : choose_origin", SQL, "has its origin amid"),
     ("glb: an origin in a corner", FORMAT, "floor(rint((high - low) / step) / 2) * step : low / 2 + high / 2", "0 : low", SQL, "has its origin amid"),
     ("glb: feet are metres", MODEL, "m->how.metre = terrain_metre(t);", "", SQL, "a foot of the ground is one of the US"),
     ("glb: min and max of what is not kept", FORMAT, "return f;", "return f * 1.25;", SQL, "can be read"),
@@ -26,7 +26,7 @@ MUTANTS = [
     ("glb: normals of degrees are not turned", MODEL, "to[i] = (float)dot(n, axes[i]);", "to[i] = from[i];", SQL, "normals are those of the ply"),
     ("glb: degrees are about sea level", MODEL, "p[2] -= m->place[2];", "", SQL, "africa: glb is within what it says"),
     ("glb: a cut mesh lies on samples", MODEL, "if (r->mode == REQUEST_CUT) return SQLITE_OK;", "", SQL, "alpine, cut: glb+quantized"),
-    ("glb: rows past the pole have no place", MODEL, "at[1] = copysign(90, at[1]);", "at[1] = 91;", SQL, "is within what it says"),
+    ("glb: rows past the pole have no place", MODEL, "at[1] = copysign(90, at[1]);", "at[1] = 91;", SQL, "pole"),
     ("glb: floats beyond floats", FORMAT, "if (!(fabs(l->low[axis]) <= FLT_MAX && fabs(l->high[axis]) <= FLT_MAX)) return false;", "", C, "what_is_no_model_is_refused"),
     ("glb: quotes in names end them", FORMAT, "if (byte == '\"' || byte == '\\\\') add_text(s, \"\\\\\");", "", C, "text_of_the_caller_stays_text"),
     ("glb: infinity in JSON", FORMAT, "if (isfinite(value))", "if (true)", C, "text_of_the_caller_stays_text"),
