@@ -67,4 +67,35 @@ def wire():
             put("M", "%s view %d" % (file, n), one(db, "SELECT rqt_view_mesh(?, 'rqt')", view))
 
 
-{"wire": wire}[sys.argv[2]]()
+def views():
+    """Cameras one after the other: increments from the first to the last, and after each the same mesh in the formats rqt and indexed."""
+    for name, width, height, voids, block, options in (("plain", 129, 129, 0, 4, {}), ("clamped", 130, 97, 20, 4, {}), ("void", 70, 70, 400, 3, {})):
+        db = grid_terrain(name, s.rough_grid(width, height, 7, voids), cell=10, block=block)
+        token = ""
+        for n in range(20):
+            view = camera(300 + 40 * n, -700 + 30 * n, 400 - 10 * n, yaw=20 + 9 * n, pitch=-40 + n, tau=2 if n < 10 else 4)
+            given = json.dumps(dict(options, previous=token))
+            blob, after = (one(db, "SELECT rqt_view_mesh(?, ?, ?, ?)", view, what, name, given) for what in ("increment", "rqt"))
+            put("I", "%s %d" % (name, n), blob)
+            put("M", "%s %d" % (name, n), after)
+            size = struct.unpack_from("<I", blob, 40)[0]
+            at = 48 + 80 * blob[5]
+            token = blob[at:at + size].decode()
+
+
+def morph():
+    """Of each terrain meshes of several eps, the first exact; and views."""
+    window = "POLYGON((13.2 -9.7, 51.4 -9.7, 41.4 -40.1, 13.2 -40.1, 13.2 -9.7))"
+    for name, width, height, block, voids, region in (("square", 33, 33, 3, 0, None), ("large", 65, 65, 5, 0, None), ("oblong", 61, 37, 3, 0, None),
+                                                      ("wide", 40, 35, 4, 0, None), ("thin", 5, 47, 2, 0, None), ("void", 33, 33, 3, 90, None),
+                                                      ("clamped void", 50, 40, 4, 60, None), ("window", 65, 65, 4, 0, window), ("tiny", 2, 3, None, 0, None)):
+        options = {} if block is None else {"block": block}
+        db = grid_terrain(name.replace(" ", "_"), s.rough_grid(width, height, width + 3 * height, voids), **options)
+        for eps in (0, 2, 8, 25, 1000):
+            put("M", "%s eps %d" % (name, eps), one(db, "SELECT rqt_mesh(?, ?, 'rqt', NULL, '{\"outline\":\"tol\"}')", region, eps))
+        for n in range(3 if width > 30 else 0):
+            view = camera(20 + 10 * n, -height - 20, 150, yaw=20 * n - 20, pitch=-35, tau=6 - n)
+            put("M", "%s view %d" % (name, n), one(db, "SELECT rqt_view_mesh(?, 'rqt')", view))
+
+
+{"wire": wire, "views": views, "morph": morph}[sys.argv[2]]()
