@@ -67,4 +67,20 @@ def wire():
             put("M", "%s view %d" % (file, n), one(db, "SELECT rqt_view_mesh(?, 'rqt')", view))
 
 
-{"wire": wire}[sys.argv[2]]()
+def views():
+    """Cameras one after the other: increments from the first to the last, and after each the same mesh in the formats rqt and indexed."""
+    for name, width, height, voids, block, options in (("plain", 129, 129, 0, 4, {}), ("clamped", 130, 97, 20, 4, {}), ("void", 70, 70, 400, 3, {})):
+        db = grid_terrain(name, s.rough_grid(width, height, 7, voids), cell=10, block=block)
+        token = ""
+        for n in range(20):
+            view = camera(300 + 40 * n, -700 + 30 * n, 400 - 10 * n, yaw=20 + 9 * n, pitch=-40 + n, tau=2 if n < 10 else 4)
+            given = json.dumps(dict(options, previous=token))
+            blob, after = (one(db, "SELECT rqt_view_mesh(?, ?, ?, ?)", view, what, name, given) for what in ("increment", "rqt"))
+            put("I", "%s %d" % (name, n), blob)
+            put("M", "%s %d" % (name, n), after)
+            size = struct.unpack_from("<I", blob, 40)[0]
+            at = 48 + 80 * blob[5]
+            token = blob[at:at + size].decode()
+
+
+{"wire": wire, "views": views}[sys.argv[2]]()
