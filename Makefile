@@ -130,6 +130,10 @@ $(BUILD)/tests/test_%.o: tests/test_%.c $(GENERATED)
 	@echo "  compile $<"; $(CC) $(CFLAGS) $(INCLUDES) -Itests -DSQLITE_CORE $(GDAL_CFLAGS) -c $< -o $@
 $(BUILD)/tests/test_%: $(BUILD)/tests/test_%.o $(BUILD)/tests/libtest.a
 	@$(CXX) $(SANITIZE) $(LINK_TEST) -o $@ $^ $(LIBS_TEST)
+# The C decoder's answers, beside which the page's are put.
+$(BUILD)/tests/web/decode: tests/web/decode.c $(BUILD)/librqt.a
+	@mkdir -p $(@D)
+	@echo "  compile $<"; $(CC) $(CFLAGS) $(INCLUDES) -o $@ $^ $(LIBS_CORE)
 # Its own malloc stands before ours, and can say no.
 $(BUILD)/tests/test_fault_memory: LINK_TEST = -Wl,--wrap=malloc,--wrap=calloc,--wrap=realloc
 

@@ -327,7 +327,11 @@ int frame_merge(const space_frame *f, rqt_patch *patch) {
             uint32_t *to = patch->triangles + 3 * triangles++;
             to[0] = a, to[1] = b, to[2] = d;
         }
-        if (patch->triangles) patch->triangle_count = triangles;
+        for (size_t i = 2; i < patch->strip_count; i++) {
+            const uint32_t *c = patch->strip + i - 2;
+            triangles += c[0] != c[1] && c[1] != c[2] && c[2] != c[0];
+        }
+        if (patch->triangles || patch->strip) patch->triangle_count = triangles;
     }
     sqlite3_free(table);
     sqlite3_free(now);

@@ -380,17 +380,17 @@ except OSError:
 # ------------------------------------------------------------------------------------------------------------ limits
 service = Service(DB, "--max-triangles", "1000", "--max-samples", "20000", "--max-bytes", "40000", "--max-seconds", "1000", "--max-age", "60")
 ask = service.ask
-for path, status, sentence in (("/range?eps=0&f=obj", 413, "rqt_mesh(): the mesh has more than 1000 triangles"),
+for path, status, sentence in (("/range?eps=0&f=obj", 413, "rqt_answer(): the mesh has more than 1000 triangles"),
                                ("/range?eps=0", 413, "rqt_range(): the mesh has more than 1000 triangles"),
-                               ("/range?eps=0&f=strip", 413, "rqt_mesh(): the mesh has more than 1000 triangles"),
-                               ("/range?eps=0&f=rqt", 413, "rqt_mesh(): the mesh has more than 1000 triangles"),
-                               ("/range?eps=1&f=obj&mode=cut&bbox=" + BOX, 413, "rqt_mesh(): the mesh has more than 1000 triangles"),
+                               ("/range?eps=0&f=strip", 413, "rqt_answer(): the mesh has more than 1000 triangles"),
+                               ("/range?eps=0&f=rqt", 413, "rqt_answer(): the mesh has more than 1000 triangles"),
+                               ("/range?eps=1&f=obj&mode=cut&bbox=" + BOX, 413, "rqt_answer(): the mesh has more than 1000 triangles"),
                                ("/explain?eps=0", 413, "rqt_explain(): the mesh has more than 1000 triangles"),
                                ("/verify?eps=400", 413, "rqt_verify(): there are more than 20000 samples"),
                                ("/area?eps=0", 413, "rqt_area(): the mesh has more than 1000 triangles"),
                                ("/range?eps=400&f=geojson", 413, "the answer is larger than 40000 bytes"),
                                ("/view?f=ply&camera=" + CAMERA.replace('"tau": 3', '"tau": 0.5').replace(" ", "").replace('"', "%22").replace("{", "%7B").replace("}", "%7D"), 413,
-                                "rqt_view_mesh(): the mesh has more than 1000 triangles")):
+                                "rqt_view_answer(): the mesh has more than 1000 triangles")):
     answer = ask(HILLS + path)
     check("%.40s: %d" % (path, status), answer.status == status and sentence in answer.detail(), (answer.status, answer.body[:200]))
 check("a budget above the limit is still bounded", ask(HILLS + "/range?eps=0&f=obj&max_vertices=100000").status == 413)
