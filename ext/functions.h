@@ -170,6 +170,8 @@ void frame_free(space_frame *f);
 int frame_merge(const space_frame *f, rqt_patch *patch);
 /* x,y,z of each vertex of the patch, to be released with sqlite3_free, also when it fails. */
 int frame_places(const space_frame *f, const rqt_patch *patch, double **xyz, char **error);
+/* Longitude, latitude and height of 0,0,0 of frame enu. */
+const double *frame_zero(const space_frame *f);
 /* The terrain's name and what the coordinates are, a line. */
 const char *frame_title(const space_frame *f);
 /* The terrain that a value names; NULL value: the only one. */
