@@ -88,12 +88,13 @@ static int add_errors(const rqt_patch *patch, uint8_t **bytes, size_t *size, cha
     return *size > INT32_MAX ? too_large(error) : SQLITE_OK;
 }
 
-int wire_mesh(request *r, bool normals, bool errors, uint8_t **bytes, size_t *size, char **error) {
+int wire_mesh(request *r, bool normals, bool errors, mesh_told *told, uint8_t **bytes, size_t *size, char **error) {
     answer a = {{0}, {0}};
     int code = store_begin(r->store, error); /* mesh and normals of one state of the database */
     if (code != SQLITE_OK) return code;
     code = answer_read(r, r->eps, &a, error);
     if (code == SQLITE_OK) code = encode(r, r->achieved_eps, 0, &a, NULL, bytes, size, error);
+    if (code == SQLITE_OK) code = request_tell(r, &a.patch, told, error);
     if (code == SQLITE_OK && normals) code = add_normals(r, &a.patch, bytes, size, error);
     if (code == SQLITE_OK && errors) code = add_errors(&a.patch, bytes, size, error);
     store_end(r->store);

@@ -34,7 +34,7 @@ static void take_argument(input *in, const char *name, size_t n, char *text, siz
         {"eps", {"0", "0.5", "3", "20", "1000", "1e9", "9e999", "1e-3"}},
         {"terrain", {"'hills'", "'plain'", "'hills'", "'plain'", "'main.hills'", "NULL", "'hills'", "'plain'"}},
         {"options",
-         {"NULL", "'{\"max_triangles\":30,\"previous\":\"\"}'", "'{\"metric\":\"minimal\"}'",
+         {"NULL", "'{\"max_triangles\":30,\"previous\":\"\",\"cover\":\"terrain\"}'", "'{\"metric\":\"minimal\"}'",
           "'{\"select\":\"bottomup\"}'", "'{\"outline\":\"tol\"}'", "'{\"max_vertices\":60}'",
           "'{\"mode\":\"border\"}'", "'{\"mode\":\"cut\",\"strip\":\"fan\"}'"}},
         {"format",
