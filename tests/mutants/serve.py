@@ -11,7 +11,7 @@ MUTANTS = [
     ("serve: infinite errors are numbers", "src/serve/answer.c", 'buffer_text(b, "null");', 'buffer_text(b, "0");', SERVE, "infinite errors null"),
     ("serve: a triangle of GeoJSON is open", "src/serve/meshes.c", "corner < 4; corner++", "corner < 3; corner++", SERVE, "range as GeoJSON"),
     ("serve: the last column of what is told is lost", "src/serve/meshes.c", "for (int i = ROW_COLUMNS; i < columns && count == 0; i++)", "for (int i = ROW_COLUMNS + 1; i < columns && count == 0; i++)", SERVE,
-     "says the eps"),
+     "JSON says the same"),
     ("serve: two databases of one name are mixed", "src/serve/documents.c", "if (!holds(collections,", "if (1 || !holds(collections,", SERVE, "of one name the first one's"),
     # what is asked
     ("serve: a parameter may come twice", "src/serve/target.c", "if (request_parameter(r, next->name)) {", "if (0) {", SERVE, "eps=1&eps=2"),
