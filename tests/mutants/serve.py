@@ -25,7 +25,7 @@ MUTANTS = [
     ("serve: a body is passed over", "src/serve/http.c", "if (!has_body(r)) return MHD_YES;", "return MHD_YES;", SERVE, "with one"),
     # negotiation and tags
     ("serve: weights do not count", "src/serve/negotiate.c", "e->weight = read_weight(p + 2);", "e->weight = 1000;", SERVE, "Accept-Encoding"),
-    ("serve: a weight of 0 is a yes", "src/serve/negotiate.c", "if (weight[packed] > 0 &&", "if (weight[packed] >= 0 &&", SERVE, "Accept-Encoding"),
+    ("serve: a weight of 0 is a yes", "src/serve/negotiate.c", "return weight[*c] > 0;", "return true;", SERVE, "nothing is acceptable"),
     ("serve: what is packed has the tag of what is not", "src/serve/endpoints.c", 'a->coding == CODING_IDENTITY ? "" : coding_name(a->coding)', '""', SERVE, "a tag of its own"),
     ("serve: a tag is not of the request", "src/serve/endpoints.c", "add_text(add_text(0xCBF29CE484222325u, RQT_VERSION), r->target)", "0xCBF29CE484222325u", SERVE, "a tag of its own"),
     ("serve: a tag does not know the change counter", "src/serve/database.c", "hash = add_to_hash(hash, header + HEADER_COUNTER, HEADER_BYTES - HEADER_COUNTER);", "", SERVE, "tag"),
