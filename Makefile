@@ -24,8 +24,9 @@ IMPORT = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/import/*.c))
 PICTURE = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/picture/*.c src/text/*.c))
 SERVE = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/serve/*.c)) $(BUILD)/generated/web_files.o
 CLI = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/cli/*.c))
-# What the query service has in it: the page, and what it says of itself.
-WEB_FILES = $(wildcard src/serve/web/*) src/serve/openapi.json
+# What the query service has in it: the page, and what it says of itself. The page is the same in every build.
+WEB = build/web
+WEB_FILES = $(WEB)/index.html $(WEB)/viewer.css $(WEB)/viewer.js $(WEB)/decoder.js src/serve/openapi.json
 GENERATED = $(BUILD)/generated/schema_sql.h
 
 LIBS_CORE = -lzstd -lm
@@ -37,6 +38,7 @@ CAIRO_CFLAGS = $(shell pkg-config --cflags cairo libpng 2>/dev/null)
 .PHONY: all
 all: ## build the command and the extension: build/rqt and build/rqt.so
 	@./src/install-packages.sh build
+	@./src/install-packages.sh web || echo "No node and npm: rqt serve goes without its viewer" >&2
 	@$(MAKE) --no-print-directory -j2 products
 	@echo "$(BUILD)/rqt and $(BUILD)/rqt.so are ready"
 
@@ -72,6 +74,9 @@ $(BUILD)/picture/%.o: src/picture/%.c
 $(BUILD)/serve/%.o: src/serve/%.c
 	@mkdir -p $(@D)
 	@echo "  compile $<"; $(CC) $(CFLAGS) $(INCLUDES) -DSQLITE_CORE -c $< -o $@
+$(WEB)/viewer.js: $(wildcard src/web/*) src/web/.npmrc
+	@echo "  bundle $@"; ./src/web/bundle.sh $(WEB) build/web-packages
+$(filter-out $(WEB)/viewer.js,$(filter $(WEB)/%,$(WEB_FILES))): $(WEB)/viewer.js ;
 $(BUILD)/generated/web_files.c: src/serve/embed.sh $(WEB_FILES)
 	@mkdir -p $(@D)
 	@./src/serve/embed.sh $(WEB_FILES) > $@
@@ -103,10 +108,11 @@ $(BUILD)/generated/schema_sql.h: sql/schema.sql sql/terrain.sql sql/fill.sql sql
 demo: all ## import a real DEM and show what rqt does with it; pictures in build/demo
 	@BUILD=$(BUILD) ./examples/demo.sh
 
+PORT ?= 8080
 .PHONY: serve-demo
-serve-demo: all ## the query service and its page on the demo's terrain, at http://127.0.0.1:8080/
+serve-demo: all ## the query service and its page on the demo's terrain, at http://127.0.0.1:8080/ (PORT=0: where it is free)
 	@[ -e $(BUILD)/demo/white-mountains.gpkg ] || $(MAKE) --no-print-directory demo
-	@$(BUILD)/rqt serve $(BUILD)/demo/white-mountains.gpkg
+	@$(BUILD)/rqt serve --port $(PORT) $(BUILD)/demo/white-mountains.gpkg
 
 # ------------------------------------------------------------------------------------------------------ tests
 # Everything that a test may want of us in one archive; the linker takes what each one needs.
@@ -125,6 +131,10 @@ $(BUILD)/tests/test_%.o: tests/test_%.c $(GENERATED)
 	@echo "  compile $<"; $(CC) $(CFLAGS) $(INCLUDES) -Itests -DSQLITE_CORE $(GDAL_CFLAGS) -c $< -o $@
 $(BUILD)/tests/test_%: $(BUILD)/tests/test_%.o $(BUILD)/tests/libtest.a
 	@$(CXX) $(SANITIZE) $(LINK_TEST) -o $@ $^ $(LIBS_TEST)
+# The C decoder's answers, beside which the page's are put.
+$(BUILD)/tests/web/decode: tests/web/decode.c $(BUILD)/librqt.a
+	@mkdir -p $(@D)
+	@echo "  compile $<"; $(CC) $(CFLAGS) $(INCLUDES) -o $@ $^ $(LIBS_CORE)
 # Its own malloc stands before ours, and can say no.
 $(BUILD)/tests/test_fault_memory: LINK_TEST = -Wl,--wrap=malloc,--wrap=calloc,--wrap=realloc
 
@@ -173,7 +183,7 @@ coverage: ## the test programs in a build that counts: the core's lines, 100 % b
 # What runs on several threads: readers beside a writer, the import's reader and workers, which work on sweeps and builds;
 # and the query service's workers.
 THREADED = test_fault_threads
-.PHONY: test-threads test-serve
+.PHONY: test-threads test-serve test-web
 test-threads: ## what runs on several threads, under ThreadSanitizer
 	@./src/install-packages.sh build test
 	@$(MAKE) --no-print-directory -j2 products
@@ -188,6 +198,11 @@ test-serve: ## the query service's tests, plain and under ASan and UBSan
 	  SANITIZE="-fsanitize=address,undefined -fno-sanitize-recover=undefined" $(BUILD)/sanitized/rqt
 	@RQT=$(CURDIR)/$(BUILD)/rqt RQT_SO=$(CURDIR)/$(BUILD)/rqt.so ./tests/test_serve.sh quiet
 	@ASAN_OPTIONS=detect_leaks=1 LSAN_OPTIONS=suppressions=$(CURDIR)/tests/leaks.supp:print_suppressions=0 RQT_HOSTILE_MIB=1024 RQT=$(CURDIR)/$(BUILD)/sanitized/rqt RQT_SO=$(CURDIR)/$(BUILD)/rqt.so ./tests/test_serve.sh quiet
+
+test-web: ## the page in headless Chromium, and its modules in node; pictures in build/web-shots
+	@./src/install-packages.sh build test web browser
+	@$(MAKE) --no-print-directory -j2 products
+	@BUILD=$(BUILD) ./tests/web/run.sh
 
 # clang's libFuzzer steers by what code an input reaches; what it finds stays in build/fuzz/NAME.
 SECONDS ?= 60

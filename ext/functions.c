@@ -93,10 +93,13 @@ const function rqt_functions[] = {
     {.name = "rqt_mesh",
      .arguments = "region, eps, format [, terrain [, options]]",
      .returns = "BLOB, TEXT for obj",
-     .purpose = "The mesh of a region as a file's bytes; format: strip, indexed, rqt (src/core/FORMAT.md; rqt "
-                "takes about a byte a vertex), obj, ply, wkb, gpkg, spatialite; ply+normals, rqt+normals: with the "
-                "terrain's normal at every vertex, from the full-resolution samples around it. Of mode cut and "
-                "frames only obj, ply, wkb, gpkg, spatialite.",
+     .purpose =
+         "The mesh of a region as a file's bytes; format: strip, indexed, rqt (src/core/FORMAT.md; rqt "
+         "takes about a byte a vertex), obj, ply, wkb, gpkg, spatialite, glb (glTF 2.0: metres about an "
+         "origin, y up); glb+quantized: in 16 bits; ply+normals, glb+normals, glb+quantized+normals, "
+         "rqt+normals: with the terrain's normal at every vertex, from the full-resolution samples around it; "
+         "rqt+errors, rqt+normals+errors: with what rqt_range has in its column error. Of mode cut and "
+         "frames only obj, ply, wkb, gpkg, spatialite, glb.",
      .example = "SELECT length(rqt_mesh(" SUMMIT ", 10, 'ply'))",
      .call = call_mesh,
      .least = 3,

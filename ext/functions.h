@@ -138,8 +138,8 @@ typedef struct mesh_told {
 int request_tell(request *r, const rqt_patch *patch, mesh_told *told, char **error);
 int told_columns(bool is_view);
 void put_told(const mesh_told *told, int column, sqlite3_context *result);
-/* The patch in wire format, with normals or without. delta.c */
-int wire_mesh(request *r, bool normals, mesh_told *told, uint8_t **bytes, size_t *size, char **error);
+/* The patch in wire format, with normals and errors or without. delta.c */
+int wire_mesh(request *r, bool normals, bool errors, mesh_told *told, uint8_t **bytes, size_t *size, char **error);
 /* A mesh as the bytes of a file. */
 typedef struct mesh_bytes {
     uint8_t *bytes; /* to be released with sqlite3_free */
@@ -170,6 +170,8 @@ void frame_free(space_frame *f);
 int frame_merge(const space_frame *f, rqt_patch *patch);
 /* x,y,z of each vertex of the patch, to be released with sqlite3_free, also when it fails. */
 int frame_places(const space_frame *f, const rqt_patch *patch, double **xyz, char **error);
+/* Longitude, latitude and height of 0,0,0 of frame enu. */
+const double *frame_zero(const space_frame *f);
 /* The terrain's name and what the coordinates are, a line. */
 const char *frame_title(const space_frame *f);
 /* The terrain that a value names; NULL value: the only one. */

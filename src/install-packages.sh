@@ -1,8 +1,8 @@
 #!/bin/sh
 # install-packages.sh PURPOSE... - installs the Debian packages that a purpose needs and this machine lacks, saying which.
 #
-# Purposes: build, test, format, fuzz, lint, bench, peers, views (ETOPO5, and pictures of views), qgis (650 MB). Does nothing,
-# silently, when all is there. Needs root or sudo only when something is missing. On another system it says what to install by hand.
+# Purposes: build, web (the viewer's bundle), browser (which the tests see it in), test, format, fuzz, lint, bench, peers, views (ETOPO5, and pictures of
+# views), qgis (650 MB). Does nothing, silently, when all is there. Needs root or sudo only when something is missing. On another system it says what to install by hand.
 set -eu
 
 packages_for() {
@@ -15,8 +15,9 @@ packages_for() {
     fuzz) echo clang-14 libclang-rt-14-dev ;;
     lint) echo clang-tidy-14 cppcheck ;;
     bench) echo wrk nginx-light curl python3 util-linux ;;
+    browser) echo chromium fonts-dejavu-core ;;
     views) echo ferret-datasets python3-pil ;;
-    peers) command -v node >/dev/null 2>&1 && command -v npm >/dev/null 2>&1 || echo nodejs npm ;;
+    web | peers) command -v node >/dev/null 2>&1 && command -v npm >/dev/null 2>&1 || echo nodejs npm ;;
     *) echo "install-packages.sh: unknown purpose $1" >&2; exit 2 ;;
     esac
 }

@@ -1,0 +1,101 @@
+#!/usr/bin/python3
+"""meshes.py OUT WHAT - meshes of terrains as the bytes that SQL gives, for the tests of src/web.
+
+OUT holds records: 1 byte what ('M' a mesh in wire format, 'D' an increment of rqt_delta on the one before, 'I' an increment of a view, 'X' the
+mesh of the same view in format indexed), 4 bytes each the sizes of name and bytes, the name, the bytes.
+"""
+import json
+import os
+import struct
+import sys
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
+import sql_support as s  # noqa: E402
+from sql_support import one  # noqa: E402
+
+out = open(sys.argv[1], "wb")
+
+
+def put(what, name, blob):
+    name = name.encode()
+    out.write(what.encode() + struct.pack("<II", len(name), len(blob)) + name + blob)
+
+
+def terrain(name, source, **options):
+    path = s.temp(name + ".db")
+    s.import_terrain(path, source, name=name, **options)
+    return s.connect(path)
+
+
+def grid_terrain(name, grid, crs=None, x0=0, y0=None, cell=1, **options):
+    return terrain(name, s.write_grid(s.temp(name + ".asc"), grid, x0, y0, cell, crs), **options)
+
+
+def camera(x, y, z, **more):
+    return json.dumps(dict({"eye": [x, y, z], "yaw": 20, "pitch": -40, "fovy": 60, "width": 400, "height": 300, "tau": 2}, **more))
+
+
+def wire():
+    """Terrains of many sizes and blocks; whole and in windows, with normals, as views, and what makes them finer."""
+    for width, height, block, voids in ((1, 1, None, 0), (2, 3, None, 0), (4, 1, None, 0), (5, 17, 1, 0), (17, 5, 2, 0), (100, 37, 3, 0), (100, 37, 5, 60),
+                                        (37, 61, 2, 90), (34, 18, 4, 0), (65, 65, 6, 0), (130, 97, 7, 20), (50, 40, 3, 700), (33, 65, 1, 5)):
+        name = "%dx%d k%s v%d" % (width, height, block, voids)
+        options = {} if block is None else {"block": block}
+        db = grid_terrain(name.replace(" ", "_"), s.rough_grid(width, height, width + height, voids), **options)
+        windows = (None, "POLYGON((3.2 -9.7, 21.4 -9.7, 21.4 -30.1, 3.2 -30.1, 3.2 -9.7))", "LINESTRING(1 -1, 30 -17)", "POINT(9 -9)",
+                   "POLYGON((-9 50, -8 50, -8 51, -9 50))")
+        for number, region in enumerate(windows):
+            before = None
+            for eps in (float("inf"), 50, 10, 3, 0):
+                title = "%s window %d eps %g" % (name, number, eps)
+                if before is not None and number < 2:
+                    put("D", title, one(db, "SELECT rqt_delta(?, ?, ?)", region, before, eps))
+                if before is None or number > 1:
+                    put("M", title, one(db, "SELECT rqt_mesh(?, ?, 'rqt')", region, eps))
+                before = eps
+        put("M", name + " normals", one(db, "SELECT rqt_mesh(NULL, 4, 'rqt+normals')"))
+        if width > 30:
+            for eps in (0, 2, 40):
+                put("M", name + " tol", one(db, "SELECT rqt_mesh(NULL, ?, 'rqt', NULL, '{\"outline\":\"tol\"}')", eps))
+    for file, block in (("glarus_1arc_native_161.tif", 5), ("glarus_alpine_25m_161.tif", 7), ("SainteHelens.dem", 7), ("N42E001.hgt.zip", 7), ("N41E001.hgt.zip", 8)):
+        db = terrain(file.split(".")[0], os.path.join(s.DATA, file), block=block)
+        for eps in (0, 5, 50) if not file.startswith("N4") else (5, 50):
+            put("M", "%s eps %d" % (file, eps), one(db, "SELECT rqt_mesh(NULL, ?, 'rqt')", eps))
+        x0, y0, dx, dy, width, height, top = one(db, "SELECT x0, y0, dx, dy, width, height, max_z FROM rqt_terrains")
+        for n in range(4):
+            view = camera(x0 + dx * width * (n + 1) / 5, y0 + dy * height * .9, top + 300 + 500 * n, yaw=40 * n - 60, pitch=-15 - 5 * n)
+            put("M", "%s view %d" % (file, n), one(db, "SELECT rqt_view_mesh(?, 'rqt')", view))
+
+
+def views():
+    """Cameras one after the other: increments from the first to the last, and after each the same mesh in the formats rqt and indexed."""
+    for name, width, height, voids, block, options in (("plain", 129, 129, 0, 4, {}), ("clamped", 130, 97, 20, 4, {}), ("void", 70, 70, 400, 3, {})):
+        db = grid_terrain(name, s.rough_grid(width, height, 7, voids), cell=10, block=block)
+        token = ""
+        for n in range(20):
+            view = camera(300 + 40 * n, -700 + 30 * n, 400 - 10 * n, yaw=20 + 9 * n, pitch=-40 + n, tau=2 if n < 10 else 4)
+            given = json.dumps(dict(options, previous=token))
+            blob, after = (one(db, "SELECT rqt_view_mesh(?, ?, ?, ?)", view, what, name, given) for what in ("increment", "rqt"))
+            put("I", "%s %d" % (name, n), blob)
+            put("M", "%s %d" % (name, n), after)
+            size = struct.unpack_from("<I", blob, 40)[0]
+            at = 48 + 80 * blob[5]
+            token = blob[at:at + size].decode()
+
+
+def morph():
+    """Of each terrain meshes of several eps, the first exact; and views."""
+    window = "POLYGON((13.2 -9.7, 51.4 -9.7, 41.4 -40.1, 13.2 -40.1, 13.2 -9.7))"
+    for name, width, height, block, voids, region in (("square", 33, 33, 3, 0, None), ("large", 65, 65, 5, 0, None), ("oblong", 61, 37, 3, 0, None),
+                                                      ("wide", 40, 35, 4, 0, None), ("thin", 5, 47, 2, 0, None), ("void", 33, 33, 3, 90, None),
+                                                      ("clamped void", 50, 40, 4, 60, None), ("window", 65, 65, 4, 0, window), ("tiny", 2, 3, None, 0, None)):
+        options = {} if block is None else {"block": block}
+        db = grid_terrain(name.replace(" ", "_"), s.rough_grid(width, height, width + 3 * height, voids), **options)
+        for eps in (0, 2, 8, 25, 1000):
+            put("M", "%s eps %d" % (name, eps), one(db, "SELECT rqt_mesh(?, ?, 'rqt', NULL, '{\"outline\":\"tol\"}')", region, eps))
+        for n in range(3 if width > 30 else 0):
+            view = camera(20 + 10 * n, -height - 20, 150, yaw=20 * n - 20, pitch=-35, tau=6 - n)
+            put("M", "%s view %d" % (name, n), one(db, "SELECT rqt_view_mesh(?, 'rqt')", view))
+
+
+{"wire": wire, "views": views, "morph": morph}[sys.argv[2]]()

@@ -1,0 +1,44 @@
+// wire.test.mjs - src/web/wire.js gives the mesh that the C decoder gives.
+import assert from 'node:assert/strict';
+import {test} from 'node:test';
+import {applyDelta, decodeMesh, normalOf} from '../../src/web/wire.js';
+import {decodeInC, isSame, recordsOf} from './oracle.mjs';
+
+const records = recordsOf('wire');
+const meshes = decodeInC(records);
+
+/** What differs between a mesh and the C decoder's; '' for nothing. */
+function difference(mesh, expected) {
+    if (!expected) return 'the C decoder says no';
+    for (const name of ['vertexCount', 'triangleCount']) if (mesh[name] !== expected[name]) return `${name} ${mesh[name]}, not ${expected[name]}`;
+    for (const name of ['col', 'row', 'q', 'triangles']) if (!isSame(mesh[name], expected[name])) return name;
+    if ((mesh.normals === null) !== (expected.normals === null)) return 'normals';
+    for (let i = 0; mesh.normals && i < mesh.vertexCount; i++) {
+        const normal = normalOf(mesh.normals[2 * i], mesh.normals[2 * i + 1]);
+        for (let c = 0; c < 3; c++) if (Math.fround(normal[c]) !== expected.normals[3 * i + c]) return `normal of ${i}`;
+    }
+    return '';
+}
+
+test('every mesh is the C decoder\'s, bit for bit', () => {
+    let vertices = 0, normals = 0;
+    records.forEach(({what, name, bytes}, i) => {
+        if (what !== 'M') return;
+        const mesh = decodeMesh(bytes);
+        assert.equal(difference(mesh, meshes[i]), '', name);
+        vertices += mesh.vertexCount;
+        normals += mesh.normals !== null;
+    });
+    assert.ok(vertices > 500000 && normals > 5, `${vertices} vertices, ${normals} with normals`);
+});
+
+test('increments of rqt_delta end in the C decoder\'s meshes, bit for bit', () => {
+    let before = null, steps = 0;
+    records.forEach(({what, name, bytes}, i) => {
+        const mesh = what === 'M' ? decodeMesh(bytes, {leaves: true}) : applyDelta(before, bytes);
+        assert.equal(difference(mesh, meshes[i]), '', name);
+        steps += what === 'D';
+        before = mesh;
+    });
+    assert.ok(steps > 50, steps);
+});
