@@ -1,4 +1,5 @@
-/* delta.c - meshes in wire format: rqt_mesh(..., 'rqt') and rqt_delta. The bytes are src/core/FORMAT.md, "Wire". */
+/* delta.c - meshes in wire format: rqt_mesh(..., 'rqt'), normals and errors beside them, and rqt_delta. The bytes
+ * are src/core/FORMAT.md, "Wire". */
 #include "functions.h"
 
 #include <string.h>
@@ -25,6 +26,10 @@ static void answer_free(answer *a) {
     store_reads_free(&a->reads);
 }
 
+static int too_large(char **error) {
+    return fail(error, "the mesh is larger than 2 GiB; ask for less or a larger eps");
+}
+
 /* state NULL: the mesh; else the increment from it. */
 static int encode(const request *r, double eps, double eps_from, const answer *a, const rqt_patch *state,
                   uint8_t **bytes, size_t *size, char **error) {
@@ -49,7 +54,7 @@ static int encode(const request *r, double eps, double eps_from, const answer *a
     if (status == RQT_INVALID)
         code = fail(error, "terrain %s is damaged: its blocks do not agree on one mesh; see rqt_check", t->name);
     else if (status == RQT_OK && *size > INT32_MAX)
-        code = fail(error, "the mesh is larger than 2 GiB; ask for less or a larger eps");
+        code = too_large(error);
     if (code == SQLITE_OK) {
         uint8_t *fitting = sqlite3_realloc64(*bytes, *size);
         if (fitting) *bytes = fitting;
@@ -72,17 +77,26 @@ static int add_normals(const request *r, const rqt_patch *patch, uint8_t **bytes
         longer ? rqt_wire_add_normals(normals, count, store_allocator(), *bytes, size) : RQT_NO_MEMORY;
     sqlite3_free(normals);
     if (status != RQT_OK) return SQLITE_NOMEM;
-    if (*size > INT32_MAX) return fail(error, "the mesh is larger than 2 GiB; ask for less or a larger eps");
-    return SQLITE_OK;
+    return *size > INT32_MAX ? too_large(error) : SQLITE_OK;
 }
 
-int wire_mesh(request *r, bool normals, uint8_t **bytes, size_t *size, char **error) {
+/* The errors of the patch behind its mesh, and behind its normals if these are there. */
+static int add_errors(const rqt_patch *patch, uint8_t **bytes, size_t *size, char **error) {
+    uint8_t *longer = sqlite3_realloc64(*bytes, *size + rqt_wire_errors_bound(patch->vertex_count));
+    if (longer) *bytes = longer;
+    if (!longer || rqt_wire_add_errors(patch, store_allocator(), *bytes, size) != RQT_OK) return SQLITE_NOMEM;
+    return *size > INT32_MAX ? too_large(error) : SQLITE_OK;
+}
+
+int wire_mesh(request *r, bool normals, bool errors, mesh_told *told, uint8_t **bytes, size_t *size, char **error) {
     answer a = {{0}, {0}};
     int code = store_begin(r->store, error); /* mesh and normals of one state of the database */
     if (code != SQLITE_OK) return code;
     code = answer_read(r, r->eps, &a, error);
     if (code == SQLITE_OK) code = encode(r, r->achieved_eps, 0, &a, NULL, bytes, size, error);
+    if (code == SQLITE_OK) code = request_tell(r, &a.patch, told, error);
     if (code == SQLITE_OK && normals) code = add_normals(r, &a.patch, bytes, size, error);
+    if (code == SQLITE_OK && errors) code = add_errors(&a.patch, bytes, size, error);
     store_end(r->store);
     if (code != SQLITE_OK) {
         sqlite3_free(*bytes);

@@ -255,28 +255,29 @@ static int encode(request *r, const rqt_patch *mesh, const char *token, uint8_t 
     return SQLITE_OK;
 }
 
-int view_increment(request *r, uint8_t **bytes, size_t *size, char **error) {
+int view_increment(request *r, mesh_told *told, uint8_t **bytes, size_t *size, char **error) {
     view *v = r->view;
     rqt_patch mesh = {0};
-    char *token = NULL;
     *bytes = NULL;
     if (v->is_unchanged) {
+        rqt_increment_header header;
+        rqt_message why;
         *size = sizeof v->unchanged;
         *bytes = sqlite3_malloc64(*size);
         if (!*bytes) return SQLITE_NOMEM;
         memcpy(*bytes, v->unchanged, *size);
-        return SQLITE_OK;
+        const int code = request_tell(r, NULL, told, error);
+        if (code == SQLITE_OK && rqt_increment_info(*bytes, *size, &header, &why) == RQT_OK) {
+            told->vertices = header.vertex_count;
+            told->triangles = header.triangle_count;
+        }
+        return code;
     }
     int code = sorted_mesh(r, &mesh, error);
-    if (code == SQLITE_OK) code = view_token_of(r, &mesh, &token, error);
-    if (code == SQLITE_OK) code = encode(r, &mesh, token, bytes, size, error);
+    if (code == SQLITE_OK) code = request_tell(r, &mesh, told, error);
+    if (code == SQLITE_OK) code = encode(r, &mesh, told->token, bytes, size, error);
     if (code == SQLITE_OK) code = keep_mesh(r, &v->last, &mesh, v->unchanged);
-    if (code != SQLITE_OK) {
-        sqlite3_free(*bytes);
-        *bytes = NULL;
-    }
     rqt_patch_free(&mesh);
-    sqlite3_free(token);
     return code;
 }
 

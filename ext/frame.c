@@ -25,6 +25,7 @@
 struct space_frame {
     const store_terrain *terrain;
     geo_frame *geo;
+    double zero[3];        /* of enu: longitude, latitude and height of 0,0,0 */
     bool seam, pole[2];    /* first and last column are one; first, last row are a pole */
     rqt_vertex pole_at[2]; /* the first valid sample of a pole's row */
     int32_t pole_q[2];
@@ -206,6 +207,7 @@ static int create(const request *r, const char *name, space_frame **out, char **
     f->terrain = t;
     const double lon = t->placement.x0 + (t->lattice.width - 1) / 2.0 * t->placement.dx,
                  lat = t->placement.y0 + (t->lattice.height - 1) / 2.0 * t->placement.dy;
+    f->zero[0] = lon, f->zero[1] = lat;
     if (r->frame_kind == FRAME_ENU)
         sqlite3_snprintf(sizeof f->title, f->title, "%s, frame enu about longitude %!.15g latitude %!.15g height 0",
                          t->name, lon, lat);
@@ -327,7 +329,11 @@ int frame_merge(const space_frame *f, rqt_patch *patch) {
             uint32_t *to = patch->triangles + 3 * triangles++;
             to[0] = a, to[1] = b, to[2] = d;
         }
-        if (patch->triangles) patch->triangle_count = triangles;
+        for (size_t i = 2; i < patch->strip_count; i++) {
+            const uint32_t *c = patch->strip + i - 2;
+            triangles += c[0] != c[1] && c[1] != c[2] && c[2] != c[0];
+        }
+        if (patch->triangles || patch->strip) patch->triangle_count = triangles;
     }
     sqlite3_free(table);
     sqlite3_free(now);
@@ -351,6 +357,10 @@ int frame_places(const space_frame *f, const rqt_patch *patch, double **xyz, cha
             return fail(error, "option \"frame\": no place in space at %!.15g, %!.15g", lonlath[0], lonlath[1]);
     }
     return SQLITE_OK;
+}
+
+const double *frame_zero(const space_frame *f) {
+    return f->zero;
 }
 
 const char *frame_title(const space_frame *f) {

@@ -54,10 +54,13 @@ const function rqt_functions[] = {
      .arguments = "",
      .returns = "name, srid, width, height, cell_x, cell_y, min_z, max_z, quantum, voids, blocks, bytes, max_error",
      .purpose = "The terrains of this connection's databases. Heights, quantum and max_error in metres, cells in "
-                "CRS units.",
+                "CRS units. lonlat: x and y are degrees, on the ellipsoid of semi_major (metres) and "
+                "inverse_flattening (0: a sphere); else metre: metres in a unit of them.",
      .example = "SELECT name, width, height, min_z, max_z FROM rqt_terrains",
      .fill = fill_terrains,
-     .hidden = "schema, complete, x0, y0, dx, dy, k, quantum_error, crs, vertical, source, created",
+     .hidden =
+         "schema, complete, x0, y0, dx, dy, k, quantum_error, crs, vertical, source, created, crs_name, lonlat, "
+         "metre, semi_major, inverse_flattening",
      .keeps_statements = true},
     {.name = "rqt_range",
      .arguments = MESH,
@@ -69,7 +72,7 @@ const function rqt_functions[] = {
          "gpkg: the vertex as a GeoPackage POINT Z.",
      .example = "SELECT count(*) FROM rqt_range(" SUMMIT ", 10)",
      .fill = fill_range,
-     .hidden = "col, row, q, achieved_eps, gpkg"},
+     .hidden = "col, row, q, vertices, triangles, achieved_eps, gpkg"},
     {.name = "rqt_triangles",
      .arguments = MESH,
      .returns = "id, x0, y0, z0, x1, y1, z1, x2, y2, z2",
@@ -77,7 +80,7 @@ const function rqt_functions[] = {
                 "GeoPackage POLYGON Z, for layers; as a result of OGR write +gpkg AS geom.",
      .example = "SELECT count(*), max(z0) FROM rqt_triangles(" SUMMIT ", 10, NULL, '{\"mode\":\"cut\"}')",
      .fill = fill_triangles,
-     .hidden = "achieved_eps, gpkg"},
+     .hidden = "vertices, triangles, achieved_eps, gpkg"},
     {.name = "rqt_strip",
      .arguments = MESH,
      .returns = "seq, x, y, z",
@@ -86,19 +89,29 @@ const function rqt_functions[] = {
                 "triangle with two equal vertices is a join.",
      .example = "SELECT count(*) FROM rqt_strip(" SUMMIT ", 10)",
      .fill = fill_strip,
-     .hidden = "achieved_eps"},
+     .hidden = "vertices, triangles, achieved_eps"},
     {.name = "rqt_mesh",
      .arguments = "region, eps, format [, terrain [, options]]",
      .returns = "BLOB, TEXT for obj",
-     .purpose = "The mesh of a region as a file's bytes; format: strip, indexed, rqt (src/core/FORMAT.md; rqt "
-                "takes about a byte a vertex), obj, ply, wkb, gpkg, spatialite; ply+normals, rqt+normals: with the "
-                "terrain's normal at every vertex, from the full-resolution samples around it. Of mode cut and "
-                "frames only obj, ply, wkb, gpkg, spatialite.",
+     .purpose =
+         "The mesh of a region as a file's bytes; format: strip, indexed, rqt (src/core/FORMAT.md; rqt "
+         "takes about a byte a vertex), obj, ply, wkb, gpkg, spatialite, glb (glTF 2.0: metres about an "
+         "origin, y up); glb+quantized: in 16 bits; ply+normals, glb+normals, glb+quantized+normals, "
+         "rqt+normals: with the terrain's normal at every vertex, from the full-resolution samples around it; "
+         "rqt+errors, rqt+normals+errors: with what rqt_range has in its column error. Of mode cut and "
+         "frames only obj, ply, wkb, gpkg, spatialite, glb.",
      .example = "SELECT length(rqt_mesh(" SUMMIT ", 10, 'ply'))",
      .call = call_mesh,
      .least = 3,
      .most = 5,
      .flags = READS},
+    {.name = "rqt_answer",
+     .arguments = "region, eps, format [, terrain [, options]]",
+     .returns = "mesh, vertices, triangles, achieved_eps",
+     .purpose = "One row: the bytes that rqt_mesh gives, and beside them what they are the mesh of.",
+     .example = "SELECT length(mesh), vertices, achieved_eps FROM rqt_answer(" SUMMIT
+                ", 1, 'rqt', NULL, '{\"max_vertices\":500}')",
+     .fill = fill_answer},
     {.name = "rqt_delta",
      .arguments = "region, eps_from, eps_to [, terrain]",
      .returns = "BLOB",
@@ -159,6 +172,7 @@ const function rqt_functions[] = {
          "Terrains in degrees are in space; terrain hides nothing, "
          "not even the Earth what is behind it: give far. Outlines of voids are tol "
          "unless options say exact. "
+         "cover: picture, what may be seen; terrain: all of the terrain, as coarse as may be beside the picture. "
          "max_triangles: the smallest achieved_tau >= tau that takes no more. previous: \"\" or the token of the "
          "last "
          "answer, which stays while the camera moves little. To move vertices without a jump: z_from, the height "
@@ -167,7 +181,8 @@ const function rqt_functions[] = {
          "parent_b, the rowids of the ends of the edge that a vertex halves.",
      .example = "SELECT count(*) FROM rqt_view(" CAMERA ")",
      .fill = fill_view,
-     .hidden = "col, row, q, achieved_tau, guaranteed, token, gpkg, parent_a, parent_b, z_from, weight"},
+     .hidden = "col, row, q, vertices, triangles, achieved_tau, guaranteed, token, gpkg, parent_a, parent_b, "
+               "z_from, weight"},
     {.name = "rqt_view_triangles",
      .arguments = VIEW,
      .returns = "id, x0, y0, z0, x1, y1, z1, x2, y2, z2",
@@ -176,14 +191,14 @@ const function rqt_functions[] = {
          "terrain, not exaggerated.",
      .example = "SELECT count(*), max(guaranteed) FROM rqt_view_triangles(" CAMERA ")",
      .fill = fill_view_triangles,
-     .hidden = "achieved_tau, guaranteed, token, gpkg"},
+     .hidden = "vertices, triangles, achieved_tau, guaranteed, token, gpkg"},
     {.name = "rqt_view_strip",
      .arguments = VIEW,
      .returns = "seq, x, y, z",
      .purpose = "The same triangles as one generalized strip, as of rqt_strip.",
      .example = "SELECT count(*) FROM rqt_view_strip(" CAMERA ")",
      .fill = fill_view_strip,
-     .hidden = "achieved_tau, guaranteed, token"},
+     .hidden = "vertices, triangles, achieved_tau, guaranteed, token"},
     {.name = "rqt_view_mesh",
      .arguments = "camera, format [, terrain [, options]]",
      .returns = "BLOB, TEXT for obj",
@@ -197,6 +212,14 @@ const function rqt_functions[] = {
      .least = 2,
      .most = 4,
      .flags = READS},
+    {.name = "rqt_view_answer",
+     .arguments = "camera, format [, terrain [, options]]",
+     .returns = "mesh, vertices, triangles, achieved_tau, guaranteed, token",
+     .purpose =
+         "One row: the bytes that rqt_view_mesh gives, and beside them what they promise; vertices and triangles "
+         "of the whole mesh, also where the bytes are an increment.",
+     .example = "SELECT length(mesh), triangles, achieved_tau, guaranteed FROM rqt_view_answer(" CAMERA ", 'rqt')",
+     .fill = fill_view_answer},
     {.name = "rqt_view_explain",
      .arguments = VIEW,
      .returns = "level, extent, why, bytes, cached, selected",

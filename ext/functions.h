@@ -78,7 +78,8 @@ typedef enum request_mode { REQUEST_COVER, REQUEST_SNAP, REQUEST_BORDER, REQUEST
 /* region, eps, terrain, options, as every mesh function takes them. request.c */
 typedef enum frame_kind { FRAME_CRS, FRAME_ECEF, FRAME_ENU } frame_kind; /* in the order of options.c */
 typedef struct space_frame space_frame;
-typedef struct view view; /* view.h */
+typedef struct view view;                                          /* view.h */
+typedef enum view_cover { VIEW_PICTURE, VIEW_TERRAIN } view_cover; /* in the order of options.c */
 typedef struct request {
     connection *connection; /* held while the request lives */
     store *store;
@@ -88,18 +89,20 @@ typedef struct request {
     request_mode mode;
     double eps;
     store_query_options options;
-    struct cJSON *detail;      /* the option, as it came; NULL: none */
-    places *places;            /* what it says; detail.c */
-    frame_kind frame_kind;     /* where the mesh is drawn */
-    space_frame *frame;        /* NULL for FRAME_CRS; frame.c */
-    bool fans;                 /* the strip goes round the centres of blocks */
-    int64_t max_vertices;      /* 0: any number */
-    int64_t max_triangles;     /* of a view; 0: any number */
-    char *previous;            /* of a view: "", or the token of the last answer; NULL: there is no next one */
-    rqt_view_test test;        /* of a view */
-    bool has_test, has_metric; /* the options name one */
+    struct cJSON *detail;  /* the option, as it came; NULL: none */
+    places *places;        /* what it says; detail.c */
+    frame_kind frame_kind; /* where the mesh is drawn */
+    space_frame *frame;    /* NULL for FRAME_CRS; frame.c */
+    bool fans;             /* the strip goes round the centres of blocks */
+    int64_t max_vertices;  /* 0: any number */
+    int64_t max_triangles; /* of a view; 0: any number */
+    char *previous;        /* of a view: "", or the token of the last answer; NULL: there is no next one */
+    rqt_view_test test;    /* of a view */
+    view_cover cover;      /* of a view: what the answer covers */
+    bool has_test, has_cover, has_metric; /* the options name one */
     double achieved_eps; /* of the mesh: eps, or more to keep within max_vertices; known after request_patch */
-    view *view; /* NULL, or the view that is asked for: then the region is what may be seen, and eps is infinite */
+    view *
+        view; /* NULL, or the view that is asked for: then the region is what its cover says, and eps is infinite */
 } request;
 
 /* `usual` is the mode when the options name none. */
@@ -121,8 +124,32 @@ int request_patch(request *r, rqt_product product, rqt_patch *patch, store_reads
 int request_cut(request *r, rqt_cut *cut, char **error);
 /* SQLITE_OK in any other mode; else a sentence that what is asked for cannot hold the answer. cut.c */
 int request_refuse_cut(const request *r, const char *what, char **error);
-/* The patch in wire format, with normals or without. delta.c */
-int wire_mesh(request *r, bool normals, uint8_t **bytes, size_t *size, char **error);
+/* What is told of a mesh as a whole, whatever it comes as: columns vertices, triangles, achieved_eps; of a view
+ * vertices, triangles, achieved_tau, guaranteed, token. answer_tables.c */
+typedef struct mesh_told {
+    bool is_view;
+    uint64_t vertices, triangles;
+    double achieved; /* eps, or a view's tau */
+    bool guaranteed; /* of a view */
+    char *token;     /* of a view with option previous, to be released with sqlite3_free; else NULL */
+} mesh_told;
+/* Of the answer whose patch this is, before its places become one in a frame. NULL, of a cut and of a view that is
+ * unchanged: the counts are the caller's. */
+int request_tell(request *r, const rqt_patch *patch, mesh_told *told, char **error);
+int told_columns(bool is_view);
+void put_told(const mesh_told *told, int column, sqlite3_context *result);
+/* The patch in wire format, with normals and errors or without. delta.c */
+int wire_mesh(request *r, bool normals, bool errors, mesh_told *told, uint8_t **bytes, size_t *size, char **error);
+/* A mesh as the bytes of a file. */
+typedef struct mesh_bytes {
+    uint8_t *bytes; /* to be released with sqlite3_free */
+    size_t size;
+    bool is_text; /* UTF-8 */
+    mesh_told told;
+} mesh_bytes;
+/* Of region, eps or camera; format; terrain and options, NULL where they are missing: what rqt_mesh and
+ * rqt_view_mesh answer. On failure there is nothing to be released. scalar.c */
+int mesh_bytes_make(connection *c, bool is_view, sqlite3_value **arguments, mesh_bytes *out, char **error);
 void request_free(request *r);
 /* A geometry of the request as a region; `what` it is, for sentences. On a terrain in degrees it is one on every
  * turn that meets the terrain, for longitudes are the same modulo 360: the geometry gets more members. */
@@ -143,6 +170,8 @@ void frame_free(space_frame *f);
 int frame_merge(const space_frame *f, rqt_patch *patch);
 /* x,y,z of each vertex of the patch, to be released with sqlite3_free, also when it fails. */
 int frame_places(const space_frame *f, const rqt_patch *patch, double **xyz, char **error);
+/* Longitude, latitude and height of 0,0,0 of frame enu. */
+const double *frame_zero(const space_frame *f);
 /* The terrain's name and what the coordinates are, a line. */
 const char *frame_title(const space_frame *f);
 /* The terrain that a value names; NULL value: the only one. */
@@ -180,6 +209,7 @@ int fail(char **error, const char *format, ...);
 /* The functions themselves, by file. */
 fill_rows fill_range, fill_triangles, fill_strip;                          /* mesh_tables.c */
 fill_rows fill_view, fill_view_triangles, fill_view_strip;                 /* mesh_tables.c */
+fill_rows fill_answer, fill_view_answer;                                   /* answer_tables.c */
 fill_rows fill_profile, fill_area;                                         /* profile.c, area.c */
 fill_rows fill_view_explain;                                               /* insight_tables.c */
 fill_rows fill_terrains, fill_explain, fill_verify, fill_check, fill_help; /* insight_tables.c, verify_table.c */

@@ -2,6 +2,7 @@
 #include "view.h"
 
 #include "format.h"
+#include "geo.h"
 
 #include <math.h>
 #include <string.h>
@@ -20,6 +21,25 @@ static void release_terrains(void *data) {
 
 static void text(sqlite3_context *result, const char *value) {
     sqlite3_result_text(result, value, -1, SQLITE_TRANSIENT);
+}
+
+/* What the first quotation marks of a CRS in WKT hold. */
+static void put_crs_name(const char *wkt, sqlite3_context *result) {
+    const char *start = strchr(wkt, '"'), *end = start ? strchr(start + 1, '"') : NULL;
+    if (end) sqlite3_result_text(result, start + 1, (int)(end - start - 1), SQLITE_TRANSIENT);
+}
+
+/* crs_name, lonlat, metre, semi_major, inverse_flattening: what makes places in space of x, y and height. */
+static void put_space(const store_terrain *t, int column, sqlite3_context *result) {
+    geo_ellipsoid earth = GEO_WGS84;
+    if (column == 0)
+        put_crs_name(t->crs, result);
+    else if (column == 1)
+        sqlite3_result_int(result, t->lonlat);
+    else if (column == 2 && !t->lonlat)
+        sqlite3_result_double(result, terrain_metre(t));
+    else if (column > 2 && t->lonlat && (t->wgs84 || geo_ellipsoid_of_wkt(t->crs, &earth)))
+        sqlite3_result_double(result, column == 3 ? earth.a : earth.f != 0 ? 1 / earth.f : 0);
 }
 
 static void terrains_column(void *data, size_t row, int column, sqlite3_context *result) {
@@ -103,8 +123,11 @@ static void terrains_column(void *data, size_t row, int column, sqlite3_context 
     case 23:
         text(result, t->source);
         break;
-    default:
+    case 24:
         text(result, t->created);
+        break;
+    default:
+        put_space(t, column - 25, result);
         break;
     }
 }

@@ -14,11 +14,7 @@ typedef struct mesh {
     format_frame frame;
     double factor; /* rqt_unit_factor */
     store *store;  /* lives as long as the table does */
-    double achieved_eps;
-    bool is_view;
-    double achieved_tau; /* of a view */
-    bool guaranteed;
-    char *token;    /* NULL: none */
+    mesh_told told;
     double *from;   /* of a view, if asked for: heights in quanta that vertices come from, NaN: they do not move */
     uint32_t *ends; /* and the ends of the edges that they halve */
     double *xyz;    /* of each vertex, in a frame of its own; NULL: the terrain's CRS */
@@ -28,7 +24,7 @@ static void release(void *data) {
     mesh *m = data;
     store_keep(m->store, &m->patch);
     sqlite3_free(m->xyz);
-    sqlite3_free(m->token);
+    sqlite3_free(m->told.token);
     sqlite3_free(m->from);
     sqlite3_free(m->ends);
     rqt_cut_free(&m->cut);
@@ -85,7 +81,7 @@ static int make_cut(request *r, rqt_product product, mesh *m, char **error) {
 }
 
 /* The mesh of the arguments, not yet as rows. */
-#define MORPH_COLUMNS (UINT32_C(15) << 7) /* of rqt_view: parent_a, parent_b, z_from, weight */
+#define MORPH_COLUMNS (UINT32_C(15) << 9) /* of rqt_view: parent_a, parent_b, z_from, weight */
 
 static int make_mesh(connection *c, bool is_view, sqlite3_value **arguments, rqt_product product, row_set *rows,
                      mesh **out, char **error) {
@@ -104,17 +100,18 @@ static int make_mesh(connection *c, bool is_view, sqlite3_value **arguments, rqt
             (format_frame){.placement = r.terrain->placement, .unit = r.terrain->unit, .srid = request_srid(&r)};
         m->factor = rqt_unit_factor(&m->frame.unit);
         m->store = r.store;
+        /* At a pole triangles vanish, which only those that are listed can. */
+        if (r.frame && product == RQT_PRODUCT_VERTICES) product = RQT_PRODUCT_TRIANGLES;
         code = r.mode == REQUEST_CUT ? make_cut(&r, product, m, error)
                                      : request_patch(&r, product, &m->patch, NULL, error);
-        m->achieved_eps = r.achieved_eps;
-        m->is_view = is_view;
-        if (is_view) m->achieved_tau = r.view->achieved_tau, m->guaranteed = r.view->guaranteed;
-        if (code == SQLITE_OK && is_view) code = view_token_of(&r, &m->patch, &m->token, error);
+        if (code == SQLITE_OK) code = request_tell(&r, m->is_cut ? NULL : &m->patch, &m->told, error);
         if (code == SQLITE_OK && morphs && !r.frame) code = view_morph(&r, &m->patch, &m->from, &m->ends, error);
         if (code == SQLITE_OK && r.frame) {
             code = frame_merge(r.frame, &m->patch);
             if (code == SQLITE_OK) code = frame_places(r.frame, &m->patch, &m->xyz, error);
         }
+        m->told.vertices = m->is_cut ? m->cut.vertex_count : m->patch.vertex_count;
+        m->told.triangles = m->is_cut ? m->cut.triangle_count : m->patch.triangle_count;
     }
     request_free(&r);
     if (code != SQLITE_OK) {
@@ -126,20 +123,6 @@ static int make_mesh(connection *c, bool is_view, sqlite3_value **arguments, rqt
     rows->count = m->patch.strip_count;
     *out = m;
     return SQLITE_OK;
-}
-
-/* What is told of the whole mesh, in every row: achieved_eps; of a view achieved_tau, guaranteed and token. */
-static int told_columns(const mesh *m) {
-    return m->is_view ? 3 : 1;
-}
-
-static void put_told(const mesh *m, int which, sqlite3_context *result) {
-    if (which == 2)
-        sqlite3_result_text(result, m->token, -1, SQLITE_TRANSIENT);
-    else if (which == 1)
-        sqlite3_result_int(result, m->guaranteed);
-    else
-        sqlite3_result_double(result, m->is_view ? m->achieved_tau : m->achieved_eps);
 }
 
 /* Of which a vertex that is no sample of the mesh has no level, and places and heights that are not whole. */
@@ -181,14 +164,14 @@ static void morph_column(const mesh *m, size_t row, int which, sqlite3_context *
 
 static void range_column(void *data, size_t row, int column, sqlite3_context *result) {
     const mesh *m = data;
-    if (column > 8 + told_columns(m))
-        morph_column(m, row, column - 9 - told_columns(m), result);
+    if (column > 8 + told_columns(m->told.is_view))
+        morph_column(m, row, column - 9 - told_columns(m->told.is_view), result);
     else if (column < 3)
         put_coordinate(m, (uint32_t)row, column, result);
-    else if (column == 8 + told_columns(m))
+    else if (column == 8 + told_columns(m->told.is_view))
         put_geometry(m, &(const uint32_t){(uint32_t)row}, 1, result);
     else if (column >= 8)
-        put_told(m, column - 8, result);
+        put_told(&m->told, column - 8, result);
     else if (m->is_cut)
         cut_column(m, row, column, result);
     else
@@ -219,10 +202,10 @@ static void triangles_column(void *data, size_t row, int column, sqlite3_context
         sqlite3_result_int64(result, (sqlite3_int64)row + 1);
     else if (column < 10)
         put_coordinate(m, corners[(column - 1) / 3], (column - 1) % 3, result);
-    else if (column == 10 + told_columns(m))
+    else if (column == 10 + told_columns(m->told.is_view))
         put_geometry(m, corners, 3, result);
     else
-        put_told(m, column - 10, result);
+        put_told(&m->told, column - 10, result);
 }
 
 static int fill_faces(connection *c, bool is_view, sqlite3_value **arguments, row_set *rows, char **error) {
@@ -247,7 +230,7 @@ static void strip_column(void *data, size_t row, int column, sqlite3_context *re
     if (column == 0)
         sqlite3_result_int64(result, (sqlite3_int64)row);
     else if (column >= 4)
-        put_told(m, column - 4, result);
+        put_told(&m->told, column - 4, result);
     else
         put_coordinate(m, m->patch.strip[row], column - 1, result);
 }

@@ -22,6 +22,7 @@ static const choice choices[] = {
     {"max_triangles", "#1"},
     {"previous", "~"},
     {"frame", " crs ecef enu "},
+    {"cover", " picture terrain "},
     {"test", " guaranteed ulrich node sphere lindstrom lodmap "},
 };
 
@@ -74,6 +75,7 @@ static int read_one(const cJSON *item, request *r, char **error) {
     if (strcmp(c->key, "outline") == 0) r->options.outline = (rqt_outline)index_of(c, value);
     if (strcmp(c->key, "select") == 0) r->options.select = (rqt_select)index_of(c, value);
     if (strcmp(c->key, "metric") == 0) r->options.metric = (rqt_metric)index_of(c, value), r->has_metric = true;
+    if (strcmp(c->key, "cover") == 0) r->cover = (view_cover)index_of(c, value), r->has_cover = true;
     if (strcmp(c->key, "test") == 0) r->test = (rqt_view_test)index_of(c, value), r->has_test = true;
     if (strcmp(c->key, "strip") == 0) r->fans = strcmp(value, "fan") == 0;
     return SQLITE_OK;

@@ -67,6 +67,7 @@ static int begin(connection *c, sqlite3_value *terrain, sqlite3_value *options, 
     if (code == SQLITE_OK && r->mode == REQUEST_CUT && r->frame_kind != FRAME_CRS)
         code = fail(error, "option \"frame\" does not go with mode \"cut\"");
     const char *of_views = r->has_test            ? "test"
+                           : r->has_cover         ? "cover"
                            : r->max_triangles > 0 ? "max_triangles"
                            : r->previous          ? "previous"
                                                   : NULL;

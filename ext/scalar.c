@@ -1,8 +1,5 @@
 /* scalar.c - the functions that give one value. */
-#include "view.h"
-
-#include "format.h"
-#include "geo.h"
+#include "model.h"
 
 #include <math.h>
 #include <string.h>
@@ -73,10 +70,67 @@ static int own_format(const request *r, const rqt_patch *patch, rqt_mesh_kind ki
     return code;
 }
 
+/* What argument `format` asks for. */
+typedef struct mesh_format {
+    enum { MESH_STRIP, MESH_INDEXED, MESH_WIRE, MESH_INCREMENT, MESH_OTHER } family;
+    format_kind kind; /* of MESH_OTHER */
+    bool quantized, normals, errors;
+    char name[16]; /* without those; cut where it is none of ours */
+} mesh_format;
+
+#define KNOWN                                                                                                   \
+    " strip indexed rqt obj ply wkb gpkg spatialite glb ply+normals rqt+normals rqt+errors rqt+normals+errors " \
+    "glb+normals glb+quantized glb+quantized+normals, and increment of views"
+
+/* Takes a suffix off the name. */
+static bool take_suffix(const char *text, size_t *length, const char *suffix) {
+    const size_t n = strlen(suffix);
+    const bool is_there = *length > n && memcmp(text + *length - n, suffix, n) == 0;
+    if (is_there) *length -= n;
+    return is_there;
+}
+
+static int read_format(sqlite3_value *value, mesh_format *f, char **error) {
+    static const char *const own[] = {"strip", "indexed", "rqt", "increment"};
+    if (sqlite3_value_type(value) != SQLITE_TEXT) return fail(error, "format must be a text: one of%s", KNOWN);
+    const char *text = (const char *)sqlite3_value_text(value);
+    if (!text) return SQLITE_NOMEM;
+    size_t length = strlen(text);
+    *f = (mesh_format){.family = MESH_OTHER, .kind = FORMAT_OBJ};
+    f->errors = take_suffix(text, &length, "+errors");
+    f->normals = take_suffix(text, &length, "+normals");
+    f->quantized = take_suffix(text, &length, "+quantized");
+    sqlite3_snprintf(sizeof f->name, f->name, "%.*s", (int)length, text);
+    for (int i = 0; i < 4; i++)
+        if (strcmp(f->name, own[i]) == 0) f->family = i;
+    if (f->family == MESH_OTHER && !format_from_name(f->name, &f->kind))
+        return fail(error, "unknown format \"%s\"; there are%s", text, KNOWN);
+    if (f->normals && f->family != MESH_WIRE && f->kind != FORMAT_PLY && f->kind != FORMAT_GLB)
+        return fail(error, "format \"%s\" has no normals; ply, glb and rqt have", f->name);
+    if (f->errors && f->family != MESH_WIRE)
+        return fail(error, "format \"%s\" has no errors of vertices; rqt has", f->name);
+    if (f->quantized && f->kind != FORMAT_GLB)
+        return fail(error, "format \"%s\" is not quantized; glb can be", f->name);
+    return SQLITE_OK;
+}
+
 static int format_failed(rqt_status status, char **error) {
     if (status == RQT_OK) return SQLITE_OK;
     if (status == RQT_NO_MEMORY) return SQLITE_NOMEM;
     return fail(error, "the mesh is larger than 2 GiB in this format; ask for less or a larger eps");
+}
+
+/* A mesh in the coordinates of the answer. */
+static int write_mesh(const request *r, const format_mesh *mesh, const mesh_format *f, uint8_t **bytes,
+                      size_t *size, char **error) {
+    if (f->kind != FORMAT_GLB)
+        return format_failed(format_write(mesh, f->kind, store_allocator(), bytes, size), error);
+    model m;
+    int code = model_create(r, mesh, f->quantized, &m, error);
+    if (code == SQLITE_OK)
+        code = format_failed(format_write(&m.mesh, f->kind, store_allocator(), bytes, size), error);
+    model_free(&m);
+    return code;
 }
 
 static void framed_coordinates(const void *context, size_t vertex, double xyz[3]) {
@@ -84,7 +138,7 @@ static void framed_coordinates(const void *context, size_t vertex, double xyz[3]
 }
 
 /* In a frame of its own: geocentric has an SRID, east-north-up has none. */
-static int framed_format(const request *r, rqt_patch *patch, format_kind kind, uint8_t **bytes, size_t *size,
+static int framed_format(const request *r, rqt_patch *patch, const mesh_format *f, uint8_t **bytes, size_t *size,
                          char **error) {
     double *xyz = NULL;
     int code = frame_merge(r->frame, patch);
@@ -97,21 +151,23 @@ static int framed_format(const request *r, rqt_patch *patch, format_kind kind, u
                               .srid = request_srid(r),
                               .title = frame_title(r->frame),
                               .eps = r->achieved_eps};
-    if (code == SQLITE_OK) code = format_failed(format_write(&mesh, kind, store_allocator(), bytes, size), error);
+    if (code == SQLITE_OK) code = write_mesh(r, &mesh, f, bytes, size, error);
     sqlite3_free(xyz);
     return code;
 }
 
-static int other_format(const request *r, rqt_patch *patch, format_kind kind, const float *normals, uint8_t **bytes,
-                        size_t *size, char **error) {
-    if (r->frame) return framed_format(r, patch, kind, bytes, size, error);
+static int other_format(const request *r, rqt_patch *patch, const mesh_format *f, const float *normals,
+                        uint8_t **bytes, size_t *size, char **error) {
+    if (r->frame) return framed_format(r, patch, f, bytes, size, error);
     const format_frame frame = {.placement = r->terrain->placement,
                                 .unit = r->terrain->unit,
                                 .srid = r->terrain->srid,
                                 .title = r->terrain->name,
                                 .eps = r->achieved_eps,
                                 .normals = normals};
-    return format_failed(format_patch(patch, &frame, kind, store_allocator(), bytes, size), error);
+    const format_source source = {patch, &frame};
+    const format_mesh mesh = format_mesh_of(&source);
+    return write_mesh(r, &mesh, f, bytes, size, error);
 }
 
 typedef struct cut_source {
@@ -130,10 +186,14 @@ static void cut_coordinates(const void *context, size_t vertex, double xyz[3]) {
     xyz[2] = ((double)unit->z0 + v->q / (double)unit->d) * rqt_unit_factor(unit) + unit->offset;
 }
 
-static int cut_format(request *r, format_kind kind, uint8_t **bytes, size_t *size, char **error) {
+static int cut_format(request *r, const mesh_format *f, mesh_told *told, uint8_t **bytes, size_t *size,
+                      char **error) {
     rqt_cut cut;
     int code = request_cut(r, &cut, error);
+    if (code == SQLITE_OK) code = request_tell(r, NULL, told, error);
     if (code != SQLITE_OK) return code;
+    told->vertices = cut.vertex_count;
+    told->triangles = cut.triangle_count;
     const cut_source source = {&cut, r->terrain};
     const format_mesh mesh = {.vertex_count = cut.vertex_count,
                               .triangle_count = cut.triangle_count,
@@ -143,43 +203,14 @@ static int cut_format(request *r, format_kind kind, uint8_t **bytes, size_t *siz
                               .srid = r->terrain->srid,
                               .title = r->terrain->name,
                               .eps = r->achieved_eps};
-    code = format_failed(format_write(&mesh, kind, store_allocator(), bytes, size), error);
+    code = write_mesh(r, &mesh, f, bytes, size, error);
     rqt_cut_free(&cut);
     return code;
 }
 
-/* What argument `format` asks for. */
-typedef struct mesh_format {
-    enum { MESH_STRIP, MESH_INDEXED, MESH_WIRE, MESH_INCREMENT, MESH_OTHER } family;
-    format_kind kind; /* of MESH_OTHER */
-    bool normals;
-    char name[16]; /* without "+normals"; cut where it is none of ours */
-} mesh_format;
-
-#define KNOWN " strip indexed rqt obj ply wkb gpkg spatialite ply+normals rqt+normals, and increment of views"
-
-static int read_format(sqlite3_value *value, mesh_format *f, char **error) {
-    static const char *const own[] = {"strip", "indexed", "rqt", "increment"};
-    static const char with_normals[] = "+normals";
-    if (sqlite3_value_type(value) != SQLITE_TEXT) return fail(error, "format must be a text: one of%s", KNOWN);
-    const char *text = (const char *)sqlite3_value_text(value);
-    if (!text) return SQLITE_NOMEM;
-    const size_t length = strlen(text), suffix = sizeof with_normals - 1;
-    const bool normals = length > suffix && strcmp(text + length - suffix, with_normals) == 0;
-    *f = (mesh_format){MESH_OTHER, FORMAT_OBJ, normals, ""};
-    sqlite3_snprintf(sizeof f->name, f->name, "%.*s", (int)(normals ? length - suffix : length), text);
-    for (int i = 0; i < 4; i++)
-        if (strcmp(f->name, own[i]) == 0) f->family = i;
-    if (strcmp(f->name, "glb") == 0) return fail(error, "format \"%s\" is not in this version", text);
-    if (f->family == MESH_OTHER && !format_from_name(f->name, &f->kind))
-        return fail(error, "unknown format \"%s\"; there are%s", text, KNOWN);
-    if (f->normals && f->family != MESH_WIRE && f->kind != FORMAT_PLY)
-        return fail(error, "format \"%s\" has no normals; ply and rqt have", f->name);
-    return SQLITE_OK;
-}
-
 /* A format that is not the wire's, out of a patch. */
-static int patch_mesh(request *r, const mesh_format *f, uint8_t **bytes, size_t *size, char **error) {
+static int patch_mesh(request *r, const mesh_format *f, mesh_told *told, uint8_t **bytes, size_t *size,
+                      char **error) {
     rqt_patch patch = {0};
     float *normals = NULL;
     int code = store_begin(r->store, error); /* mesh and normals of one state of the database */
@@ -188,18 +219,21 @@ static int patch_mesh(request *r, const mesh_format *f, uint8_t **bytes, size_t 
         request_patch(r, f->family == MESH_STRIP ? RQT_PRODUCT_STRIP : RQT_PRODUCT_TRIANGLES, &patch, NULL, error);
     if (code == SQLITE_OK && f->normals) code = store_normals(r->store, r->terrain, &patch, &normals, error);
     store_end(r->store);
+    if (code == SQLITE_OK) code = request_tell(r, &patch, told, error);
     if (code == SQLITE_OK && f->family == MESH_OTHER)
-        code = other_format(r, &patch, f->kind, normals, bytes, size, error);
+        code = other_format(r, &patch, f, normals, bytes, size, error);
     else if (code == SQLITE_OK)
         code =
             own_format(r, &patch, f->family == MESH_STRIP ? RQT_MESH_STRIP : RQT_MESH_INDEXED, bytes, size, error);
+    told->vertices = patch.vertex_count; /* in a frame some have become one */
+    told->triangles = patch.triangle_count;
     sqlite3_free(normals);
     store_keep(r->store, &patch);
     return code;
 }
 
 /* A request that has been read, in a format. */
-static int make_mesh(request *r, const mesh_format *f, uint8_t **bytes, size_t *size, char **error) {
+static int make_mesh(request *r, const mesh_format *f, mesh_bytes *out, char **error) {
     if (r->frame && f->family != MESH_OTHER)
         return fail(error, "format \"%s\" holds samples, not points in space: option \"frame\" must be crs",
                     f->name);
@@ -207,48 +241,55 @@ static int make_mesh(request *r, const mesh_format *f, uint8_t **bytes, size_t *
         return fail(error, "normals are those of the terrain's CRS: option \"frame\" must be crs");
     if (f->family != MESH_OTHER || f->normals) {
         char what[60];
-        sqlite3_snprintf(sizeof what, what, "format \"%s%s\"", f->name, f->normals ? "+normals" : "");
+        sqlite3_snprintf(sizeof what, what, "format \"%s%s%s\"", f->name, f->normals ? "+normals" : "",
+                         f->errors ? "+errors" : "");
         const int code = request_refuse_cut(r, what, error);
         if (code != SQLITE_OK) return code;
     }
-    if (f->family == MESH_INCREMENT) return view_increment(r, bytes, size, error);
-    if (f->family == MESH_WIRE) return wire_mesh(r, f->normals, bytes, size, error);
-    if (r->mode == REQUEST_CUT) return cut_format(r, f->kind, bytes, size, error);
-    return patch_mesh(r, f, bytes, size, error);
+    if (f->family == MESH_INCREMENT) return view_increment(r, &out->told, &out->bytes, &out->size, error);
+    if (f->family == MESH_WIRE)
+        return wire_mesh(r, f->normals, f->errors, &out->told, &out->bytes, &out->size, error);
+    if (r->mode == REQUEST_CUT) return cut_format(r, f, &out->told, &out->bytes, &out->size, error);
+    return patch_mesh(r, f, &out->told, &out->bytes, &out->size, error);
 }
 
-static void mesh_result(sqlite3_context *result, const char *name, int code, char *error, const mesh_format *f,
-                        uint8_t *bytes, size_t size) {
-    if (code != SQLITE_OK)
-        scalar_error(result, name, code, error);
-    else if (f->family == MESH_OTHER && f->kind == FORMAT_OBJ)
-        sqlite3_result_text64(result, (const char *)bytes, size, sqlite3_free, SQLITE_UTF8);
-    else
-        sqlite3_result_blob64(result, bytes, size, sqlite3_free);
-}
-
-/* region, eps or camera; format; terrain and options as far as they are there. */
-static void call_with_format(sqlite3_context *result, bool is_view, int count, sqlite3_value **arguments) {
-    connection *c = sqlite3_user_data(result);
-    const int first = is_view ? 1 : 2; /* the place of format */
-    sqlite3_value *terrain = count > first + 1 ? arguments[first + 1] : NULL,
-                  *options = count > first + 2 ? arguments[first + 2] : NULL;
-    char *error = NULL;
+int mesh_bytes_make(connection *c, bool is_view, sqlite3_value **arguments, mesh_bytes *out, char **error) {
+    sqlite3_value *const *format = arguments + (is_view ? 1 : 2), *terrain = format[1], *options = format[2];
     request r = {0};
-    mesh_format f = {MESH_OTHER, FORMAT_OBJ, false, ""};
-    uint8_t *bytes = NULL;
-    size_t size = 0;
-    int code = read_format(arguments[first], &f, &error);
+    mesh_format f = {.family = MESH_OTHER, .kind = FORMAT_OBJ};
+    *out = (mesh_bytes){.is_text = false};
+    int code = read_format(format[0], &f, error);
     if (code == SQLITE_OK)
         code = is_view ? request_follow_view(c, arguments[0], terrain, options,
-                                             f.family == MESH_INCREMENT ? VIEW_INCREMENT : VIEW_ANSWER, &r, &error)
-                       : request_read(c, arguments[0], arguments[1], terrain, options, REQUEST_COVER, &r, &error);
+                                             f.family == MESH_INCREMENT ? VIEW_INCREMENT : VIEW_ANSWER, &r, error)
+                       : request_read(c, arguments[0], arguments[1], terrain, options, REQUEST_COVER, &r, error);
     if (code == SQLITE_OK && f.family == MESH_INCREMENT && !r.previous)
-        code = fail(&error,
+        code = fail(error,
                     "format \"increment\" is for views with option \"previous\"; \"\" begins a sequence of them");
-    if (code == SQLITE_OK) code = make_mesh(&r, &f, &bytes, &size, &error);
+    if (code == SQLITE_OK) code = make_mesh(&r, &f, out, error);
     request_free(&r);
-    mesh_result(result, is_view ? "rqt_view_mesh" : "rqt_mesh", code, error, &f, bytes, size);
+    out->is_text = f.family == MESH_OTHER && f.kind == FORMAT_OBJ;
+    if (code == SQLITE_OK) return code;
+    sqlite3_free(out->bytes);
+    sqlite3_free(out->told.token);
+    *out = (mesh_bytes){.is_text = false};
+    return code;
+}
+
+/* terrain and options are there as far as they are given. */
+static void call_with_format(sqlite3_context *result, bool is_view, int count, sqlite3_value **given) {
+    sqlite3_value *arguments[5] = {NULL};
+    mesh_bytes mesh;
+    char *error = NULL;
+    memcpy(arguments, given, (size_t)count * sizeof *given);
+    const int code = mesh_bytes_make(sqlite3_user_data(result), is_view, arguments, &mesh, &error);
+    if (code != SQLITE_OK)
+        scalar_error(result, is_view ? "rqt_view_mesh" : "rqt_mesh", code, error);
+    else if (mesh.is_text)
+        sqlite3_result_text64(result, (const char *)mesh.bytes, mesh.size, sqlite3_free, SQLITE_UTF8);
+    else
+        sqlite3_result_blob64(result, mesh.bytes, mesh.size, sqlite3_free);
+    sqlite3_free(mesh.told.token);
 }
 
 void call_mesh(sqlite3_context *result, int count, sqlite3_value **arguments) {

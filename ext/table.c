@@ -9,7 +9,7 @@
 
 #include <string.h>
 
-#define MOST_ARGUMENTS 4
+#define MOST_ARGUMENTS 5
 
 typedef struct table {
     sqlite3_vtab base;

@@ -54,7 +54,7 @@ uint64_t view_terrain_number(const store_terrain *t) {
 int view_options_number(const request *r, uint64_t *number) {
     uint64_t h = fold(FIRST, (uint64_t)r->options.select << 32 | r->options.outline);
     h = fold(h, (uint64_t)r->options.metric << 32 | r->frame_kind);
-    h = fold(h, (uint64_t)r->max_triangles);
+    h = fold(fold(h, (uint64_t)r->max_triangles), r->cover);
     if (r->detail) {
         char *text = cJSON_PrintUnformatted(r->detail);
         if (!text) return SQLITE_NOMEM;

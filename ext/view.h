@@ -109,7 +109,7 @@ int view_settle(request *r, view_wants wants, char **error);
 void view_free(view *v); /* NULL is fine */
 
 /* The view's field, of its camera, band and achieved_tau; and the request's region, the squares in which something
- * may be drawn. view_field.c */
+ * may be drawn, or all of the terrain (option cover). view_field.c */
 int view_field(request *r, char **error);
 /* How far the nearest piece of terrain that is drawn is from the eye, about; 0 when there is none. view_field.c */
 int view_nearest(request *r, double *nearest, char **error);
@@ -122,7 +122,8 @@ int view_token_of(request *r, const rqt_patch *patch, char **token, char **error
  * sqlite3_free. The last answer's mesh is that of VIEW_MORPH; without option previous it is that of twice the
  * tolerance. The request then selects something else. */
 int view_morph(request *r, const rqt_patch *patch, double **heights, uint32_t **ends, char **error);
-/* The answer as an increment from the last one (FORMAT.md, "View increment"). */
-int view_increment(request *r, uint8_t **bytes, size_t *size, char **error);
+/* The answer as an increment from the last one (FORMAT.md, "View increment"). told->token is there also on failure.
+ */
+int view_increment(request *r, mesh_told *told, uint8_t **bytes, size_t *size, char **error);
 
 #endif

@@ -7,7 +7,8 @@
  *
  * The squares that may be seen, grown a little so that their rim is simple, are the region of the query: rings of
  * one polygon in samples, the sides of neighbours cancel (region_snap.c does the same). What is elsewhere cannot be
- * drawn. */
+ * drawn. With option cover the region may be all of the terrain instead: of the same field, so that the mesh of the
+ * picture is in it, and beside the picture as coarse as the gap to the frustum lets it be. */
 #include "view.h"
 
 #include <math.h>
@@ -215,7 +216,10 @@ int view_field(request *r, char **error) {
     const rqt_status status = rqt_field_create(&r->terrain->lattice, store_allocator(), decide, &b, &v->field);
     int code = ended(&b, status, error);
     v->guaranteed = v->test == RQT_VIEW_GUARANTEED;
-    if (code == SQLITE_OK) code = region_of(&b.shown, r->terrain, &r->region);
+    if (code == SQLITE_OK && r->cover == VIEW_TERRAIN)
+        code = request_region(r, NULL, "view", &r->region, error);
+    else if (code == SQLITE_OK)
+        code = region_of(&b.shown, r->terrain, &r->region);
     sqlite3_free(b.shown.items);
     return code;
 }

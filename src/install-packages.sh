@@ -1,7 +1,7 @@
 #!/bin/sh
 # install-packages.sh PURPOSE... - installs the Debian packages that a purpose needs and this machine lacks, saying which.
 #
-# Purposes: build, web (the viewer's bundle), test, format, fuzz, lint, bench, peers, views (ETOPO5, and pictures of
+# Purposes: build, web (the viewer's bundle), browser (which the tests see it in), test, format, fuzz, lint, bench, peers, views (ETOPO5, and pictures of
 # views), qgis (650 MB). Does nothing, silently, when all is there. Needs root or sudo only when something is missing. On another system it says what to install by hand.
 set -eu
 
@@ -15,6 +15,7 @@ packages_for() {
     fuzz) echo clang-14 libclang-rt-14-dev ;;
     lint) echo clang-tidy-14 cppcheck ;;
     bench) echo wrk nginx-light curl python3 util-linux ;;
+    browser) echo chromium fonts-dejavu-core ;;
     views) echo ferret-datasets python3-pil ;;
     web | peers) command -v node >/dev/null 2>&1 && command -v npm >/dev/null 2>&1 || echo nodejs npm ;;
     *) echo "install-packages.sh: unknown purpose $1" >&2; exit 2 ;;

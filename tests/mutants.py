@@ -35,7 +35,7 @@ def copy_tree(build, tree):
     for name in ("src", "ext", "sql", "tests", "examples", "Makefile"):
         (shutil.copytree if os.path.isdir(name) else shutil.copy2)(name, os.path.join(tree, name))
     shutil.copytree(build, os.path.join(tree, "build"),
-                    ignore=shutil.ignore_patterns("mutants", "sanitized", "threads", "coverage", "fuzz", "lint", "bench", "chart", "peers", "demo", "*.log"))
+                    ignore=shutil.ignore_patterns("mutants", "sanitized", "threads", "coverage", "fuzz", "lint", "bench", "chart", "peers", "demo", "web-tests", "web-shots", "*.log"))
 
 
 def run_mutant(tree, mutant):

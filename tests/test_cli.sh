@@ -236,13 +236,13 @@ prints "verify: rounded heights" "holds" verify u.gpkg --terrain feet --eps 0,1
 M="mesh t.gpkg --terrain hill"
 refuses "mesh: no eps" 2 "--eps is missing" $M -o a.obj
 refuses "mesh: no output" 2 "-o is missing" $M --eps 1
-refuses "mesh: .glb is for later" 2 ".glb is not in this version" $M --eps 1 -o a.glb
+refuses "mesh: an obj cannot be quantized" 2 "a.obj is not quantized; a .glb can be" $M --eps 1 --quantized -o a.obj
 refuses "mesh: an unknown ending" 2 "the file ends in" $M --eps 1 -o a.xyz
 refuses "mesh: no ending" 2 "the file ends in" $M --eps 1 -o .obj
 refuses "mesh: an unknown outline" 2 "there is no such outline; there are exact and tol" $M --eps 1 --outline x -o a.obj
 refuses "mesh: an unknown mode" 2 "there is no such mode" $M --eps 1 --mode x -o a.obj
 refuses "mesh: a list of eps for a model" 2 "--eps takes one number" $M --eps 1,2 -o a.obj
-refuses "mesh: normals in a file that holds none" 2 "a.obj holds no normals; a .ply does" $M --eps 1 --normals -o a.obj
+refuses "mesh: normals in a file that holds none" 2 "a.obj holds no normals; a .ply or a .glb does" $M --eps 1 --normals -o a.obj
 refuses "mesh: too narrow" 2 "--width 100" $M --eps 1 --width 100 -o a.png
 refuses "mesh: the database itself" 2 "is the database itself" $M --eps 1 -o ./t.gpkg
 ln -s t.gpkg link.gpkg
@@ -251,7 +251,7 @@ mkdir folder.obj
 refuses "mesh: a folder" 2 "is a folder" $M --eps 1 -o folder.obj
 mkfifo pipe.obj; refuses "mesh: a device" 2 "is a device" $M --eps 1 -o pipe.obj
 refuses "mesh: a folder that is not there" 1 "cannot be written" $M --eps 1 -o nowhere/a.obj
-for kind in obj ply gpkg svg png; do
+for kind in obj ply glb gpkg svg png; do
     refuses "mesh: unknown terrain, .$kind" 1 "nobody" mesh t.gpkg --terrain nobody --eps 1 -o "a.$kind"
     refuses "mesh: unreadable region, .$kind" 1 "rqt mesh: " $M --eps 1 --region 'CIRCLE(1)' -o "a.$kind"
 done

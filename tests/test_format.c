@@ -79,14 +79,15 @@ enum { KINDS = sizeof kinds / sizeof *kinds };
 
 static void test_names(void **state) {
     (void)state;
-    static const char *const names[] = {"obj", "ply", "wkb", "gpkg", "spatialite"};
-    for (int i = 0; i < KINDS; i++) {
+    static const char *const names[] = {"obj", "ply", "wkb", "gpkg", "spatialite", "glb"};
+    for (int i = 0; i <= KINDS; i++) {
         format_kind kind = (format_kind)99;
         assert_true(format_from_name(names[i], &kind));
-        assert_int_equal(kind, kinds[i]);
+        assert_int_equal(kind, i < KINDS ? kinds[i] : FORMAT_GLB);
     }
     format_kind kind = FORMAT_WKB;
-    static const char *const none[] = {"", "OBJ", "ob", "objx", "strip", "indexed", "glb", " ply", NULL};
+    static const char *const none[] = {"",        "OBJ", "ob",          "objx", "strip",
+                                       "indexed", "GLB", "glb+normals", " ply", NULL};
     for (size_t i = 0; i < sizeof none / sizeof *none; i++) assert_false(format_from_name(none[i], &kind));
     assert_int_equal(kind, FORMAT_WKB);
 }

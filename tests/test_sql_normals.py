@@ -146,7 +146,7 @@ n = set(ply_normals(one(db, "SELECT rqt_mesh(NULL, 0, 'ply+normals')")).values()
 check("a plane has one normal, east and north as they are", len(n) == 1 and angle(n.pop(), tuple(c / math.hypot(-1.5, -1, 1) for c in (-1.5, -1, 1))) < 1e-4)
 
 # What there is not
-raises("formats without normals say so", 'rqt_mesh(): format "obj" has no normals; ply and rqt have', lambda: one(db, "SELECT rqt_mesh(NULL, 0, 'obj+normals')"))
+raises("formats without normals say so", 'rqt_mesh(): format "obj" has no normals; ply, glb and rqt have', lambda: one(db, "SELECT rqt_mesh(NULL, 0, 'obj+normals')"))
 raises("... our own too", 'rqt_mesh(): format "strip" has no normals', lambda: one(db, "SELECT rqt_mesh(NULL, 0, 'strip+normals')"))
 raises("an unknown format with normals", 'rqt_mesh(): unknown format "dxf+normals"', lambda: one(db, "SELECT rqt_mesh(NULL, 0, 'dxf+normals')"))
 raises("normals of nothing", 'rqt_mesh(): unknown format "+normals"', lambda: one(db, "SELECT rqt_mesh(NULL, 0, '+normals')"))

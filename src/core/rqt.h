@@ -859,8 +859,8 @@ rqt_status rqt_mesh_decode(const uint8_t *bytes, size_t size, rqt_mesh_header *h
 /* ---------------------------------------------------------------------------------------------- wire --
  * A patch in about a byte a vertex, to send and to keep: topology as decisions of the walk, heights as residuals
  * (FORMAT.md, "Wire"). What is decoded is the patch of the query with leaves (wants_leaves: without, the same
- * vertices may be numbered otherwise): the same vertices and triangles in the same order; only the errors of
- * vertices are not sent and read 0. Mesh to memory in ten lines:
+ * vertices may be numbered otherwise): the same vertices and triangles in the same order; the errors of vertices
+ * read 0 unless they were sent too (rqt_wire_add_errors). Mesh to memory in ten lines:
  *
  *   rqt_wire_header header;
  *   rqt_patch patch;
@@ -881,6 +881,7 @@ rqt_status rqt_mesh_decode(const uint8_t *bytes, size_t size, rqt_mesh_header *h
 typedef struct rqt_wire_header {
     bool is_delta;
     bool has_normals; /* rqt_wire_normals has something to give; never for an increment */
+    bool has_errors;  /* those of the decoded vertices are the query's; never for an increment */
     rqt_lattice lattice;
     int k;                                 /* block size of the terrain: the order of the walk depends on it */
     uint64_t vertex_count, triangle_count; /* of the mesh; of an increment: of the mesh that it ends in */
@@ -920,8 +921,8 @@ rqt_status rqt_wire_apply(const rqt_wire_header *state_header, const rqt_patch *
 void rqt_normal_pack(const float normal[3], int8_t packed[2]);
 void rqt_normal_unpack(const int8_t packed[2], float normal[3]);
 /* Appends them, 3 floats a vertex in the patch's order, to what rqt_wire_encode wrote; bytes has room for
- * rqt_wire_normals_bound more. RQT_INVALID for an increment, another number of vertices, or a mesh that has some.
- */
+ * rqt_wire_normals_bound more. RQT_INVALID for an increment, another number of vertices, or a mesh that has some,
+ * or has errors, which come last. */
 size_t rqt_wire_normals_bound(size_t vertex_count);
 rqt_status rqt_wire_add_normals(const float *normals, size_t vertex_count, const rqt_allocator *allocator,
                                 uint8_t *bytes, size_t *size);
@@ -930,6 +931,13 @@ rqt_status rqt_wire_add_normals(const float *normals, size_t vertex_count, const
  * vertices. */
 rqt_status rqt_wire_normals(const uint8_t *bytes, size_t size, size_t vertex_count, const rqt_allocator *allocator,
                             float *normals, rqt_message *message);
+/* Appends the errors of the patch that rqt_wire_encode, and rqt_wire_add_normals if these are wanted, wrote: their
+ * codes, which rqt_wire_decode puts back into its vertices, in a tenth to half a byte a vertex (FORMAT.md,
+ * "Errors"). bytes has room for rqt_wire_errors_bound more. RQT_INVALID for an increment, another number of
+ * vertices, or a mesh that has some. Equal patches give equal bytes. */
+size_t rqt_wire_errors_bound(size_t vertex_count);
+rqt_status rqt_wire_add_errors(const rqt_patch *patch, const rqt_allocator *allocator, uint8_t *bytes,
+                               size_t *size);
 /* What an increment knows a mesh by: its vertices, their levels and heights, and its leaves, in their order. */
 uint64_t rqt_wire_digest(const rqt_patch *patch);
 

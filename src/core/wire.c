@@ -1,8 +1,10 @@
-/* wire.c - what is around the walk of the wire format: the header, worst cases, and the digest by which an
- * increment knows the mesh that it begins from. FORMAT.md, "Wire". */
+/* wire.c - what is around the walk of the wire format: the header, the frames behind it, worst cases, and the
+ * digest by which an increment knows the mesh that it begins from. FORMAT.md, "Wire". */
+#define ZSTD_STATIC_LINKING_ONLY
 #include "wire_walk.h"
 
 #include <zstd.h>
+#include <zstd_errors.h>
 
 enum {
     AT_VERSION = 4,
@@ -20,8 +22,10 @@ enum {
 
     KIND_MESH = 1,
     KIND_DELTA = 2,
-    FLAG_NORMALS = 1,
+    FLAG_NORMALS = 1 << (WIRE_NORMALS - 1),
+    FLAG_ERRORS = 1 << (WIRE_ERRORS - 1),
 
+    ZSTD_LEVEL = 3,       /* of what follows a mesh */
     ZSTD_BLOCK = 1 << 17, /* what the least zstd block, of 4 bytes, can stand for */
     LEAST_ZSTD_BLOCK = 4
 };
@@ -58,28 +62,78 @@ uint64_t wire_payload_of(const uint8_t *bytes) {
     return get64(bytes + AT_PAYLOAD);
 }
 
-void wire_mark_normals(uint8_t *bytes, size_t size) {
-    bytes[AT_FLAGS] |= FLAG_NORMALS;
-    put64(bytes + AT_CHECKSUM, checksum64(bytes, size, AT_CHECKSUM));
-}
+/* ---------------------------------------------------------------------------------------------- frames */
 
-/* The size of the frame at the beginning of room bytes, which stands for `content` bytes; 0 when there is none, or
- * one that claims more than zstd can stand for. */
-static size_t frame_size(const uint8_t *frame, size_t room, uint64_t content) {
+/* The size of the frame at the beginning of room bytes, and for how many it stands; 0 when there is none, or one
+ * that claims more than zstd can stand for. */
+static size_t frame_size(const uint8_t *frame, size_t room, uint64_t *content) {
     if (room < 4 || get32(frame) != ZSTD_MAGICNUMBER) return 0;
     const size_t size = ZSTD_findFrameCompressedSize(frame, room);
-    if (ZSTD_isError(size) || ZSTD_getFrameContentSize(frame, size) != content) return 0;
-    return content / ZSTD_BLOCK > size / LEAST_ZSTD_BLOCK ? 0 : size;
+    *content = ZSTD_getFrameContentSize(frame, size);
+    if (ZSTD_isError(size) || *content == ZSTD_CONTENTSIZE_UNKNOWN || *content == ZSTD_CONTENTSIZE_ERROR) return 0;
+    return *content / ZSTD_BLOCK > size / LEAST_ZSTD_BLOCK ? 0 : size;
 }
 
-size_t wire_mesh_frame(const uint8_t *bytes, size_t size) {
-    return frame_size(bytes + RQT_WIRE_HEADER_BYTES, size - RQT_WIRE_HEADER_BYTES, wire_payload_of(bytes));
+/* Can a frame of this part stand for so many bytes? */
+static bool content_is_possible(const uint8_t *bytes, int part, uint64_t content) {
+    const uint64_t count = get64(bytes + AT_VERTEX_COUNT), least = wire_errors_least(count);
+    if (part == WIRE_MESH) return content == wire_payload_of(bytes);
+    if (part == WIRE_NORMALS) return content == 2 * count;
+    return content >= least && content - least <= 2 * count && (content - least) % 2 == 0;
 }
+
+bool wire_parts_find(const uint8_t *bytes, size_t size, wire_part parts[WIRE_PARTS]) {
+    size_t at = RQT_WIRE_HEADER_BYTES;
+    memset(parts, 0, WIRE_PARTS * sizeof *parts);
+    for (int i = 0; i < WIRE_PARTS; i++) {
+        uint64_t content = 0;
+        if (i != WIRE_MESH && !(bytes[AT_FLAGS] >> (i - 1) & 1)) continue;
+        const size_t frame = frame_size(bytes + at, size - at, &content);
+        if (frame == 0 || !content_is_possible(bytes, i, content)) return false;
+        parts[i] = (wire_part){bytes + at, frame, (size_t)content};
+        at += frame;
+    }
+    return at == size;
+}
+
+rqt_status wire_part_get(const wire_part *part, const rqt_allocator *allocator, uint8_t *plain) {
+    rqt_allocator copy = *allocator;
+    const ZSTD_customMem memory = {wire_take, wire_drop, &copy};
+    ZSTD_DCtx *z = ZSTD_createDCtx_advanced(memory);
+    if (!z) return RQT_NO_MEMORY;
+    const size_t got = ZSTD_decompressDCtx(z, plain, part->content, part->frame, part->size);
+    const bool no_memory = ZSTD_isError(got) && ZSTD_getErrorCode(got) == ZSTD_error_memory_allocation;
+    (void)ZSTD_freeDCtx(z);
+    if (no_memory) return RQT_NO_MEMORY;
+    return got == part->content ? RQT_OK : RQT_CORRUPT;
+}
+
+rqt_status wire_part_add(int part, const uint8_t *plain, size_t content, const rqt_allocator *allocator,
+                         uint8_t *bytes, size_t *size) {
+    rqt_allocator copy = *allocator;
+    const ZSTD_customMem memory = {wire_take, wire_drop, &copy};
+    ZSTD_CCtx *z = ZSTD_createCCtx_advanced(memory);
+    if (!z) return RQT_NO_MEMORY;
+    const size_t frame = ZSTD_compressCCtx(z, bytes + *size, wire_part_bound(content), plain, content, ZSTD_LEVEL);
+    (void)ZSTD_freeCCtx(z);
+    if (ZSTD_isError(frame)) return RQT_NO_MEMORY;
+    *size += frame;
+    bytes[AT_FLAGS] = (uint8_t)(bytes[AT_FLAGS] | 1 << (part - 1));
+    put64(bytes + AT_CHECKSUM, checksum64(bytes, *size, AT_CHECKSUM));
+    return RQT_OK;
+}
+
+size_t wire_part_bound(size_t content) {
+    return ZSTD_COMPRESSBOUND(content) + 32;
+}
+
+/* ---------------------------------------------------------------------------------------------- header */
 
 static void get_header(const uint8_t *bytes, rqt_wire_header *h) {
     const mesh_frame frame = mesh_frame_get(bytes);
     *h = (rqt_wire_header){.is_delta = bytes[AT_KIND] == KIND_DELTA,
-                           .has_normals = bytes[AT_FLAGS] == FLAG_NORMALS,
+                           .has_normals = (bytes[AT_FLAGS] & FLAG_NORMALS) != 0,
+                           .has_errors = (bytes[AT_FLAGS] & FLAG_ERRORS) != 0,
                            .k = bytes[AT_K],
                            .vertex_count = get64(bytes + AT_VERTEX_COUNT),
                            .triangle_count = get64(bytes + AT_TRIANGLE_COUNT),
@@ -99,7 +153,7 @@ rqt_status rqt_wire_info(const uint8_t *bytes, size_t size, rqt_wire_header *hea
     if (bytes[AT_VERSION] != RQT_FORMAT_VERSION) return corrupt(message, "a mesh of unknown format version");
     if (bytes[AT_KIND] != KIND_MESH && bytes[AT_KIND] != KIND_DELTA)
         return corrupt(message, "the mesh is neither whole nor an increment");
-    if (bytes[AT_FLAGS] > FLAG_NORMALS || (bytes[AT_FLAGS] && bytes[AT_KIND] != KIND_MESH))
+    if (bytes[AT_FLAGS] > (FLAG_NORMALS | FLAG_ERRORS) || (bytes[AT_FLAGS] && bytes[AT_KIND] != KIND_MESH))
         return corrupt(message, "the mesh has parts that this version does not know");
     if (get64(bytes + AT_CHECKSUM) != checksum64(bytes, size, AT_CHECKSUM))
         return corrupt(message, "the mesh's checksum is wrong: its bytes have changed");
@@ -114,10 +168,8 @@ rqt_status rqt_wire_info(const uint8_t *bytes, size_t size, rqt_wire_header *hea
         return corrupt(message, "the mesh's eps is not one");
     if (h.vertex_count >= WIRE_MOST || h.triangle_count >= WIRE_MOST)
         return corrupt(message, "the mesh has more vertices or triangles than indices reach");
-    const uint8_t *frame = bytes + RQT_WIRE_HEADER_BYTES;
-    const size_t room = size - RQT_WIRE_HEADER_BYTES, mesh = wire_mesh_frame(bytes, size), rest = room - mesh;
-    const size_t normals = h.has_normals && mesh > 0 ? frame_size(frame + mesh, rest, 2 * h.vertex_count) : 0;
-    if (mesh == 0 || rest != normals || (h.has_normals && normals == 0))
+    wire_part parts[WIRE_PARTS];
+    if (!wire_parts_find(bytes, size, parts))
         return corrupt(message, "the mesh's compressed bytes are cut off, or not what follows its header");
     *header = h;
     sentence_begin(message, "");

@@ -6,11 +6,7 @@
  * streams are compared with their ends, and the payload is followed by as many zero bytes as one block can read
  * beyond them. Whatever the symbols are, the walk stays within the block's arrays.
  */
-#define ZSTD_STATIC_LINKING_ONLY
 #include "wire_walk.h"
-
-#include <zstd.h>
-#include <zstd_errors.h>
 
 typedef struct decoder {
     wire_walk walk;
@@ -191,20 +187,11 @@ static bool open_streams(wire_walk *w, const uint8_t *payload, size_t size) {
 }
 
 /* The decompressed payload with its slack of zeros. */
-static rqt_status inflate(const uint8_t *frame, size_t room, size_t payload, size_t slack,
-                          const rqt_allocator *allocator, uint8_t **out) {
-    rqt_allocator copy = *allocator;
-    const ZSTD_customMem memory = {wire_take, wire_drop, &copy};
-    *out = memory_take(allocator, payload + slack);
-    ZSTD_DCtx *z = *out ? ZSTD_createDCtx_advanced(memory) : NULL;
-    if (!z) return RQT_NO_MEMORY;
-    const size_t got = ZSTD_decompressDCtx(z, *out, payload, frame, room);
-    const bool no_memory = ZSTD_isError(got) && ZSTD_getErrorCode(got) == ZSTD_error_memory_allocation;
-    (void)ZSTD_freeDCtx(z);
-    if (no_memory) return RQT_NO_MEMORY;
-    if (got != payload) return RQT_CORRUPT;
-    memset(*out + payload, 0, slack);
-    return RQT_OK;
+static rqt_status inflate(const wire_part *mesh, size_t slack, const rqt_allocator *allocator, uint8_t **out) {
+    *out = memory_take(allocator, mesh->content + slack);
+    if (!*out) return RQT_NO_MEMORY;
+    memset(*out + mesh->content, 0, slack);
+    return wire_part_get(mesh, allocator, *out);
 }
 
 static rqt_status make_room(wire_walk *w, const rqt_wire_header *h, bool wants_leaves) {
@@ -222,16 +209,15 @@ static rqt_status corrupt(rqt_message *message, const char *sentence) {
     return RQT_CORRUPT;
 }
 
-static rqt_status run(decoder *d, const rqt_wire_header *h, const uint8_t *bytes, size_t size,
-                      const rqt_patch *state, bool wants_leaves, rqt_message *message) {
+static rqt_status run(decoder *d, const rqt_wire_header *h, const wire_part *mesh, const rqt_patch *state,
+                      bool wants_leaves, rqt_message *message) {
     wire_walk *w = &d->walk;
-    const size_t payload = (size_t)wire_payload_of(bytes);
+    const size_t payload = mesh->content;
     uint8_t *plain = NULL;
     const size_t known = state ? 3 * state->triangle_count : 0;
     if (h->vertex_count > payload + known || h->triangle_count > 2 * h->vertex_count)
         return corrupt(message, "the mesh claims more vertices or triangles than its bytes can hold");
-    rqt_status status = inflate(bytes + RQT_WIRE_HEADER_BYTES, wire_mesh_frame(bytes, size), payload,
-                                wire_slack(h->k), &w->allocator, &plain);
+    rqt_status status = inflate(mesh, wire_slack(h->k), &w->allocator, &plain);
     if (status == RQT_CORRUPT) (void)corrupt(message, "the mesh's compressed bytes do not decompress");
     if (status == RQT_OK && !open_streams(w, plain, payload))
         status = corrupt(message, "the mesh's list of streams does not fit its payload");
@@ -259,10 +245,15 @@ static rqt_status run(decoder *d, const rqt_wire_header *h, const uint8_t *bytes
 static rqt_status decode(const rqt_wire_header *h, const uint8_t *bytes, size_t size, const rqt_patch *state,
                          bool wants_leaves, const rqt_allocator *allocator, rqt_patch *patch,
                          rqt_message *message) {
+    wire_part parts[WIRE_PARTS];
+    (void)wire_parts_find(bytes, size, parts); /* they are there: rqt_wire_info has looked */
     decoder *d = memory_take(allocator, sizeof *d);
-    if (!d) return RQT_NO_MEMORY;
+    if (!d) {
+        sentence_begin(message, "out of memory");
+        return RQT_NO_MEMORY;
+    }
     rqt_status status = wire_walk_create(&d->walk, &h->lattice, h->k, allocator);
-    if (status == RQT_OK) status = run(d, h, bytes, size, state, wants_leaves, message);
+    if (status == RQT_OK) status = run(d, h, &parts[WIRE_MESH], state, wants_leaves, message);
     if (status == RQT_OK) {
         *patch = (rqt_patch){.vertices = d->walk.vertices,
                              .vertex_count = d->walk.vertex_count,
@@ -276,6 +267,11 @@ static rqt_status decode(const rqt_wire_header *h, const uint8_t *bytes, size_t 
     }
     wire_walk_free(&d->walk);
     memory_drop(allocator, d);
+    if (status == RQT_OK && h->has_errors) {
+        status = wire_errors_read(&parts[WIRE_ERRORS], h, allocator, patch);
+        if (status == RQT_CORRUPT) (void)corrupt(message, "the mesh's errors are not one of each vertex");
+        if (status != RQT_OK) rqt_patch_free(patch);
+    }
     if (status == RQT_NO_MEMORY) sentence_begin(message, "out of memory");
     return status;
 }

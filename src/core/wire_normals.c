@@ -1,5 +1,5 @@
-/* wire_normals.c - normals beside a mesh in wire format: two bytes a vertex, in a second zstd frame behind the
- * mesh. FORMAT.md, "Normals".
+/* wire_normals.c - normals beside a mesh in wire format: two bytes a vertex, in a zstd frame of their own behind
+ * the mesh. FORMAT.md, "Normals".
  *
  * A normal of terrain never points down, so its hemisphere is unfolded onto a square: the octahedron's upper half,
  * projected along z, is the diamond |x| + |y| <= 1; turned by 45 degrees it fills the square (Cigolle, Donow,
@@ -8,14 +8,11 @@
  *
  * The mesh itself neither knows nor needs them: encoding appends, and decoding the mesh passes them over.
  */
-#define ZSTD_STATIC_LINKING_ONLY
 #include "wire_walk.h"
 
 #include <math.h>
-#include <zstd.h>
-#include <zstd_errors.h>
 
-enum { ZSTD_LEVEL = 3, STEPS = 127 };
+enum { STEPS = 127 };
 
 static int8_t step_of(double v) {
     const double within = !(v > -1) ? -1 : v > 1 ? 1 : v; /* no number is -1 */
@@ -40,7 +37,7 @@ void rqt_normal_unpack(const int8_t packed[2], float normal[3]) {
 }
 
 size_t rqt_wire_normals_bound(size_t vertex_count) {
-    return ZSTD_COMPRESSBOUND(2 * vertex_count) + 32;
+    return wire_part_bound(2 * vertex_count);
 }
 
 /* The first bytes of all vertices, then the second ones: each by how far it is from the one before. */
@@ -72,26 +69,16 @@ static bool get_planes(const uint8_t *planes, size_t count, float *normals) {
 rqt_status rqt_wire_add_normals(const float *normals, size_t vertex_count, const rqt_allocator *allocator,
                                 uint8_t *bytes, size_t *size) {
     rqt_wire_header header;
-    const rqt_status status = rqt_wire_info(bytes, *size, &header, NULL);
+    rqt_status status = rqt_wire_info(bytes, *size, &header, NULL);
     if (status != RQT_OK) return status;
-    if (header.is_delta || header.has_normals || header.vertex_count != vertex_count) return RQT_INVALID;
-    rqt_allocator copy = *allocator;
-    const ZSTD_customMem memory = {wire_take, wire_drop, &copy};
+    if (header.is_delta || header.has_normals || header.has_errors || header.vertex_count != vertex_count)
+        return RQT_INVALID;
     uint8_t *planes = memory_take(allocator, 2 * vertex_count + 1);
-    ZSTD_CCtx *z = planes ? ZSTD_createCCtx_advanced(memory) : NULL;
-    size_t frame = 0;
-    if (z) {
-        put_planes(normals, vertex_count, planes);
-        frame = ZSTD_compressCCtx(z, bytes + *size, rqt_wire_normals_bound(vertex_count), planes, 2 * vertex_count,
-                                  ZSTD_LEVEL);
-    }
-    const bool done = z && !ZSTD_isError(frame);
-    (void)ZSTD_freeCCtx(z);
+    if (!planes) return RQT_NO_MEMORY;
+    put_planes(normals, vertex_count, planes);
+    status = wire_part_add(WIRE_NORMALS, planes, 2 * vertex_count, allocator, bytes, size);
     memory_drop(allocator, planes);
-    if (!done) return RQT_NO_MEMORY;
-    *size += frame;
-    wire_mark_normals(bytes, *size);
-    return RQT_OK;
+    return status;
 }
 
 static rqt_status say(rqt_message *message, rqt_status status, const char *sentence) {
@@ -102,24 +89,19 @@ static rqt_status say(rqt_message *message, rqt_status status, const char *sente
 rqt_status rqt_wire_normals(const uint8_t *bytes, size_t size, size_t vertex_count, const rqt_allocator *allocator,
                             float *normals, rqt_message *message) {
     rqt_wire_header header;
-    const rqt_status status = rqt_wire_info(bytes, size, &header, message);
+    rqt_status status = rqt_wire_info(bytes, size, &header, message);
     if (status != RQT_OK) return status;
     if (!header.has_normals) return say(message, RQT_INVALID, "the mesh was sent without normals");
     if (header.vertex_count != vertex_count)
         return say(message, RQT_INVALID, "the normals are those of another number of vertices");
-    rqt_allocator copy = *allocator;
-    const ZSTD_customMem memory = {wire_take, wire_drop, &copy};
+    wire_part parts[WIRE_PARTS];
+    (void)wire_parts_find(bytes, size, parts); /* they are there: rqt_wire_info has looked */
     uint8_t *planes = memory_take(allocator, 2 * vertex_count + 1);
-    ZSTD_DCtx *z = planes ? ZSTD_createDCtx_advanced(memory) : NULL;
-    size_t got = 0;
-    if (z) {
-        const size_t at = RQT_WIRE_HEADER_BYTES + wire_mesh_frame(bytes, size);
-        got = ZSTD_decompressDCtx(z, planes, 2 * vertex_count, bytes + at, size - at);
-    }
-    const bool no_memory = !z || (ZSTD_isError(got) && ZSTD_getErrorCode(got) == ZSTD_error_memory_allocation);
-    (void)ZSTD_freeDCtx(z);
-    const bool good = !no_memory && got == 2 * vertex_count && get_planes(planes, vertex_count, normals);
+    status = planes ? wire_part_get(&parts[WIRE_NORMALS], allocator, planes) : RQT_NO_MEMORY;
+    if (status == RQT_OK && !get_planes(planes, vertex_count, normals)) status = RQT_CORRUPT;
     memory_drop(allocator, planes);
-    if (no_memory) return say(message, RQT_NO_MEMORY, "out of memory");
-    return good ? RQT_OK : say(message, RQT_CORRUPT, "the mesh's normals do not decompress to one of each vertex");
+    if (status == RQT_NO_MEMORY) return say(message, RQT_NO_MEMORY, "out of memory");
+    return status == RQT_OK
+               ? RQT_OK
+               : say(message, RQT_CORRUPT, "the mesh's normals do not decompress to one of each vertex");
 }

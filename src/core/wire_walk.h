@@ -199,8 +199,27 @@ enum { WIRE_DIRECTORY = 2 + 5 * (WIRE_STREAMS - 1) }; /* bytes at most */
 size_t wire_slack(int k);                             /* readable bytes that must follow a payload */
 void wire_put_header(const rqt_wire_header *header, uint64_t payload, uint8_t *bytes);
 uint64_t wire_payload_of(const uint8_t *bytes);
-/* The zstd frame of the mesh: its size; 0 when it is none. Behind it come the normals, if any. */
-size_t wire_mesh_frame(const uint8_t *bytes, size_t size);
-void wire_mark_normals(uint8_t *bytes, size_t size); /* in the header: they are there now */
+/* What follows the header, a zstd frame each: the mesh, and behind it what its flags tell of, in this order. */
+enum { WIRE_MESH, WIRE_NORMALS, WIRE_ERRORS, WIRE_PARTS };
+typedef struct wire_part {
+    const uint8_t *frame; /* NULL: it is not there */
+    size_t size, content; /* bytes, and for how many they stand */
+} wire_part;
+/* False: the frames are not those that the header tells of, or something follows them. Then nothing is known. */
+bool wire_parts_find(const uint8_t *bytes, size_t size, wire_part parts[WIRE_PARTS]);
+/* plain has room for its content. RQT_CORRUPT: it does not decompress to just that. */
+rqt_status wire_part_get(const wire_part *part, const rqt_allocator *allocator, uint8_t *plain);
+/* Behind all others; bytes has room for wire_part_bound(content) more. RQT_OK or RQT_NO_MEMORY. */
+rqt_status wire_part_add(int part, const uint8_t *plain, size_t content, const rqt_allocator *allocator,
+                         uint8_t *bytes, size_t *size);
+size_t wire_part_bound(size_t content);
+
+/* wire_errors.c: the least that the errors of so many vertices are, plain; and the most less that is 2 a vertex */
+static inline uint64_t wire_errors_least(uint64_t vertex_count) {
+    return 2 + (vertex_count + 7) / 8;
+}
+/* The codes of the mesh's errors, into its vertices. RQT_OK, RQT_CORRUPT or RQT_NO_MEMORY. */
+rqt_status wire_errors_read(const wire_part *part, const rqt_wire_header *header, const rqt_allocator *allocator,
+                            rqt_patch *patch);
 
 #endif

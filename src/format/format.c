@@ -13,7 +13,6 @@
 #include "internal.h"
 
 #include <math.h>
-#include <stdlib.h>
 
 bool format_from_name(const char *name, format_kind *kind) {
     static const struct {
@@ -23,7 +22,8 @@ bool format_from_name(const char *name, format_kind *kind) {
                  {"ply", FORMAT_PLY},
                  {"wkb", FORMAT_WKB},
                  {"gpkg", FORMAT_GPKG},
-                 {"spatialite", FORMAT_SPATIALITE}};
+                 {"spatialite", FORMAT_SPATIALITE},
+                 {"glb", FORMAT_GLB}};
     for (size_t i = 0; name && i < sizeof known / sizeof *known; i++)
         if (strcmp(name, known[i].name) == 0) {
             *kind = known[i].kind;
@@ -46,28 +46,6 @@ bool mesh_coordinates(const format_mesh *mesh, size_t vertex, double xyz[3]) {
 
 /* -------------------------------------------------------------------------------------------------- text -- */
 
-/* Text that is counted, and written too when there are bytes to write to. */
-typedef struct sink {
-    uint8_t *bytes; /* NULL: count only */
-    uint64_t size;
-} sink;
-
-static void add_bytes(sink *s, const char *text, size_t n) {
-    if (s->bytes) memcpy(s->bytes + s->size, text, n);
-    s->size += n;
-}
-static void add_text(sink *s, const char *text) {
-    add_bytes(s, text, strlen(text));
-}
-static void add_count(sink *s, uint64_t v) {
-    char text[20];
-    add_bytes(s, text, (size_t)format_digits(v, text));
-}
-static void add_double(sink *s, double v) {
-    char text[32];
-    add_bytes(s, text, (size_t)format_double(v, text));
-}
-
 /* What the file holds, a line each. A title stays on its line, whatever it contains. */
 static void add_comments(sink *s, const format_mesh *mesh, const char *begin) {
     if (mesh->title) {
@@ -82,8 +60,8 @@ static void add_comments(sink *s, const format_mesh *mesh, const char *begin) {
     add_text(s, "\n");
     if (mesh->srid) {
         add_text(s, begin);
-        add_text(s, mesh->srid < 0 ? "srid -" : "srid ");
-        add_count(s, (uint64_t)llabs(mesh->srid));
+        add_text(s, "srid ");
+        add_integer(s, mesh->srid);
         add_text(s, "\n");
     }
 }
@@ -153,8 +131,9 @@ static bool write_ply_body(const format_mesh *mesh, uint8_t *p) {
 
 /* ------------------------------------------------------------------------------------------------- whole -- */
 
-/* The size of a format but obj, from the counts alone. */
+/* The size of a format but obj, from the counts alone; of a glb not quite all of it. */
 static uint64_t size_from_counts(const format_mesh *mesh, format_kind kind) {
+    if (kind == FORMAT_GLB) return glb_size_from_counts(mesh);
     if (kind != FORMAT_PLY) return geometry_size(kind, mesh->triangle_count);
     sink s = {NULL, 0};
     add_ply_header(&s, mesh);
@@ -168,8 +147,12 @@ static bool indices_are_sound(const format_mesh *mesh) {
     return true;
 }
 
-static bool write_whole(const format_mesh *mesh, format_kind kind, uint8_t *bytes) {
+static bool write_whole(const format_mesh *mesh, format_kind kind, const glb_layout *layout, uint8_t *bytes) {
     sink s = {bytes, 0};
+    if (kind == FORMAT_GLB) {
+        glb_write(mesh, layout, bytes);
+        return true;
+    }
     if (kind == FORMAT_OBJ) return add_obj(&s, mesh);
     if (kind != FORMAT_PLY) return geometry_write(kind, mesh, bytes);
     add_ply_header(&s, mesh);
@@ -180,9 +163,12 @@ rqt_status format_write(const format_mesh *mesh, format_kind kind, const rqt_all
                         size_t *size) {
     *bytes = NULL;
     *size = 0;
-    /* No format writes a vertex it keeps, or a triangle, in less than 8 bytes. With that the sums below cannot
+    /* No format writes a vertex it keeps, or a triangle, in less than 8 bytes, but a glb the triangles of less than
+     * 65536 vertices, of which there are not so many. With that the sums below cannot
      * overflow, and arrays that are too long are not looked at. */
-    bool keeps_vertices = kind == FORMAT_OBJ || kind == FORMAT_PLY;
+    bool keeps_vertices = kind == FORMAT_OBJ || kind == FORMAT_PLY || kind == FORMAT_GLB;
+    glb_layout layout;
+    if (kind == FORMAT_GLB && !mesh->model) return RQT_INVALID;
     if (mesh->triangle_count > FORMAT_LIMIT / 8) return RQT_INVALID;
     if (keeps_vertices && mesh->vertex_count > FORMAT_LIMIT / 8) return RQT_INVALID;
     if (kind != FORMAT_OBJ && size_from_counts(mesh, kind) > FORMAT_LIMIT) return RQT_INVALID;
@@ -193,12 +179,15 @@ rqt_status format_write(const format_mesh *mesh, format_kind kind, const rqt_all
         sink s = {NULL, 0};
         if (!add_obj(&s, mesh) || s.size > FORMAT_LIMIT) return RQT_INVALID;
         total = s.size;
+    } else if (kind == FORMAT_GLB) {
+        if (!glb_plan(mesh, &layout) || layout.total > FORMAT_LIMIT) return RQT_INVALID;
+        total = layout.total;
     } else
         total = size_from_counts(mesh, kind);
 
     uint8_t *p = allocator->resize(allocator->context, NULL, (size_t)total);
     if (!p) return RQT_NO_MEMORY;
-    if (!write_whole(mesh, kind, p)) {
+    if (!write_whole(mesh, kind, &layout, p)) {
         (void)allocator->resize(allocator->context, p, 0);
         return RQT_INVALID;
     }
@@ -208,27 +197,29 @@ rqt_status format_write(const format_mesh *mesh, format_kind kind, const rqt_all
 }
 
 /* ------------------------------------------------------------------------------------------------- patch -- */
-typedef struct patch_source {
-    const rqt_patch *patch;
-    const format_frame *frame;
-} patch_source;
 
 static void patch_coordinates(const void *context, size_t vertex, double xyz[3]) {
-    const patch_source *source = context;
+    const format_source *source = context;
     format_coordinates(source->frame, &source->patch->vertices[vertex], xyz);
+}
+
+format_mesh format_mesh_of(const format_source *source) {
+    const rqt_patch *patch = source->patch;
+    const format_frame *frame = source->frame;
+    return (format_mesh){.vertex_count = patch->vertex_count,
+                         .triangle_count = patch->triangle_count,
+                         .triangles = patch->triangles,
+                         .coordinates = patch_coordinates,
+                         .context = source,
+                         .srid = frame->srid,
+                         .title = frame->title,
+                         .eps = frame->eps,
+                         .normals = frame->normals};
 }
 
 rqt_status format_patch(const rqt_patch *patch, const format_frame *frame, format_kind kind,
                         const rqt_allocator *allocator, uint8_t **bytes, size_t *size) {
-    const patch_source source = {patch, frame};
-    const format_mesh mesh = {.vertex_count = patch->vertex_count,
-                              .triangle_count = patch->triangle_count,
-                              .triangles = patch->triangles,
-                              .coordinates = patch_coordinates,
-                              .context = &source,
-                              .srid = frame->srid,
-                              .title = frame->title,
-                              .eps = frame->eps,
-                              .normals = frame->normals};
+    const format_source source = {patch, frame};
+    const format_mesh mesh = format_mesh_of(&source);
     return format_write(&mesh, kind, allocator, bytes, size);
 }

@@ -1,4 +1,4 @@
-/* text.c - the shortest decimal text of a double.
+/* text.c - the shortest decimal text of a double; text into a sink.
  *
  * Of all decimals that read back as v, the one with the fewest digits, and among those the nearest to v: at most 17
  * digits, 15 when v came from a decimal of 15 or fewer. It is laid out as printf's %g does: plain from 1e-4 to
@@ -158,4 +158,30 @@ int format_double(double value, char text[32]) {
     }
     *p = 0;
     return (int)(p - text);
+}
+
+/* -------------------------------------------------------------------------------------------------- sinks -- */
+
+void add_bytes(sink *s, const char *text, size_t n) {
+    if (s->bytes) memcpy(s->bytes + s->size, text, n);
+    s->size += n;
+}
+
+void add_text(sink *s, const char *text) {
+    add_bytes(s, text, strlen(text));
+}
+
+void add_count(sink *s, uint64_t v) {
+    char text[20];
+    add_bytes(s, text, (size_t)format_digits(v, text));
+}
+
+void add_integer(sink *s, int64_t v) {
+    if (v < 0) add_text(s, "-");
+    add_count(s, v < 0 ? 0 - (uint64_t)v : (uint64_t)v);
+}
+
+void add_double(sink *s, double v) {
+    char text[32];
+    add_bytes(s, text, (size_t)format_double(v, text));
 }

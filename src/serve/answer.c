@@ -184,6 +184,31 @@ void answer_value(buffer *b, sqlite3_stmt *row, int column) {
     }
 }
 
+/* In the order of told_headers. */
+static const char *const told_columns[TOLD_HEADERS] = {"vertices",     "triangles",  "achieved_eps",
+                                                       "achieved_tau", "guaranteed", "token"};
+const char *const told_headers[TOLD_HEADERS] = {"RQT-Vertices",     "RQT-Triangles",  "RQT-Achieved-Eps",
+                                                "RQT-Achieved-Tau", "RQT-Guaranteed", "RQT-Token"};
+
+/* Numbers as JSON has them, infinity as parameters do: 9e999. */
+void answer_tell(request *r, sqlite3_stmt *row, int from) {
+    for (int i = from; i < sqlite3_column_count(row); i++)
+        for (int k = 0; k < TOLD_HEADERS; k++) {
+            if (strcmp(sqlite3_column_name(row, i), told_columns[k]) != 0) continue;
+            const double value = sqlite3_column_double(row, i);
+            buffer text = {.most = TOLD_BYTES - 1};
+            if (sqlite3_column_type(row, i) == SQLITE_TEXT)
+                buffer_text(&text, (const char *)sqlite3_column_text(row, i));
+            else if (isinf(value))
+                buffer_text(&text, "9e999");
+            else if (sqlite3_column_type(row, i) != SQLITE_NULL)
+                buffer_number(&text, value);
+            snprintf(r->answer.told[k], TOLD_BYTES, "%.*s", (int)text.size, text.bytes ? text.bytes : "");
+            r->answer.body.no_memory |= text.no_memory;
+            buffer_free(&text);
+        }
+}
+
 void answer_row(buffer *b, sqlite3_stmt *row, int from, int to) {
     buffer_text(b, "[");
     for (int i = from; i < to; i++) {

@@ -81,7 +81,7 @@ void answer_conformance(worker *w, request *r) {
 enum { NAME, SRID, WIDTH, HEIGHT, X0, Y0, DX, DY, FIRST_TOLD };
 #define COLUMNS                                                                                                \
     "name, srid, width, height, x0, y0, dx, dy, cell_x, cell_y, min_z, max_z, quantum, quantum_error, voids, " \
-    "blocks, bytes, max_error, k, crs, vertical, created"
+    "blocks, bytes, max_error, k, crs, crs_name, lonlat, metre, semi_major, inverse_flattening, vertical, created"
 
 static void add_column(cJSON *object, sqlite3_stmt *row, int i) {
     const char *name = sqlite3_column_name(row, i);

@@ -107,6 +107,8 @@ void http_sweep(service *s) {
  */
 
 static const char METHODS[] = "GET, HEAD, OPTIONS";
+static const char EXPOSED[] =
+    "ETag, RQT-Vertices, RQT-Triangles, RQT-Achieved-Eps, RQT-Achieved-Tau, RQT-Guaranteed, RQT-Token";
 
 static void put(struct MHD_Response *response, const char *name, const char *value) {
     if (value) (void)MHD_add_response_header(response, name, value);
@@ -137,10 +139,12 @@ static void put_headers(struct MHD_Response *response, const request *r) {
         put(response, MHD_HTTP_HEADER_ACCESS_CONTROL_MAX_AGE, "86400");
         return;
     }
-    put(response, MHD_HTTP_HEADER_ACCESS_CONTROL_EXPOSE_HEADERS, "ETag");
+    put(response, MHD_HTTP_HEADER_ACCESS_CONTROL_EXPOSE_HEADERS, EXPOSED);
     put(response, MHD_HTTP_HEADER_RETRY_AFTER, a->retry);
     if (a->status == MHD_HTTP_NOT_MODIFIED) return;
     put(response, MHD_HTTP_HEADER_CONTENT_TYPE, a->type);
+    for (int i = 0; i < TOLD_HEADERS; i++)
+        if (*a->told[i]) put(response, told_headers[i], a->told[i]);
     if (a->coding != CODING_IDENTITY) put(response, MHD_HTTP_HEADER_CONTENT_ENCODING, coding_name(a->coding));
     if (a->is_page)
         put(response, "Content-Security-Policy",

@@ -53,6 +53,10 @@ typedef struct parameter {
     const char *name, *value; /* UTF-8 without NUL */
 } parameter;
 
+/* What is told of a mesh in headers, beside its bytes. answer.c */
+enum { TOLD_HEADERS = 6, TOLD_BYTES = 448 /* a token has 422 */ };
+extern const char *const told_headers[TOLD_HEADERS];
+
 typedef enum coding { CODING_IDENTITY, CODING_GZIP, CODING_ZSTD } coding;
 
 typedef struct answer {
@@ -62,9 +66,10 @@ typedef struct answer {
     char etag[80];      /* quoted; "": none */
     const char *varies; /* header Vary, static; NULL: on nothing */
     coding coding;
-    const char *retry; /* Retry-After; NULL: none */
-    bool is_page;      /* HTML: tell the browser what it may load */
-    bool is_lasting;   /* may be kept as --max-age says; else by nobody */
+    const char *retry;                   /* Retry-After; NULL: none */
+    bool is_page;                        /* HTML: tell the browser what it may load */
+    bool is_lasting;                     /* may be kept as --max-age says; else by nobody */
+    char told[TOLD_HEADERS][TOLD_BYTES]; /* "": not told */
 } answer;
 
 typedef struct endpoint endpoint;
@@ -106,6 +111,8 @@ void answer_json(request *r, const char *type, cJSON *json);
 /* A column as a value of JSON; the row's columns from..to-1 as members of a JSON array: numbers and texts. */
 void answer_value(buffer *b, sqlite3_stmt *row, int column);
 void answer_row(buffer *b, sqlite3_stmt *row, int from, int to);
+/* The row's columns from .. that tell of a mesh, into headers. */
+void answer_tell(request *r, sqlite3_stmt *row, int from);
 const char *status_title(unsigned status);
 
 /* ---------------------------------------------------------------------------------- negotiation (negotiate.c) --
@@ -206,7 +213,7 @@ void query_free(query *q);
 bool number_read(const char *text, double *value);
 /* Names of options that may be given on their own, between blanks. */
 #define OPTION_NAMES \
-    "options mode outline metric select strip detail max_vertices max_triangles frame test previous "
+    "options mode outline metric select strip detail max_vertices max_triangles frame test cover previous "
 
 void answer_landing(worker *w, request *r);
 void answer_openapi(worker *w, request *r);

@@ -1,5 +1,6 @@
 /* meshes.c - meshes: of a region, of a view, and what makes one finer. As the bytes that rqt_mesh gives, unchanged;
- * as rows in JSON; as triangles in GeoJSON.
+ * as rows in JSON; as triangles in GeoJSON. Whatever the form, what is known of the whole mesh stands in the
+ * headers.
  */
 #include "internal.h"
 
@@ -27,13 +28,19 @@ static const mesh_format FORMATS[] = {
     {"geojson", "application/geo+json", SHAPE_FEATURES, false},
     {"rqt", "application/vnd.rqt.mesh", SHAPE_BYTES, true},
     {"rqt+normals", "application/vnd.rqt.mesh", SHAPE_BYTES, true},
+    {"rqt+errors", "application/vnd.rqt.mesh", SHAPE_BYTES, true},
+    {"rqt+normals+errors", "application/vnd.rqt.mesh", SHAPE_BYTES, true},
     {"glb", "model/gltf-binary", SHAPE_BYTES, false},
+    {"glb+normals", "model/gltf-binary", SHAPE_BYTES, false},
+    {"glb+quantized", "model/gltf-binary", SHAPE_BYTES, false},
+    {"glb+quantized+normals", "model/gltf-binary", SHAPE_BYTES, false},
     {"obj", "model/obj", SHAPE_BYTES, false},
     {"ply", "application/x-ply", SHAPE_BYTES, false},
     {"ply+normals", "application/x-ply", SHAPE_BYTES, false},
     {"strip", "application/vnd.rqt.strip", SHAPE_BYTES, false},
     {"indexed", "application/vnd.rqt.indexed", SHAPE_BYTES, false},
     {"wkb", "application/vnd.rqt.wkb", SHAPE_BYTES, false},
+    {"increment", "application/vnd.rqt.increment", SHAPE_BYTES, true},
     {"svg", "image/svg+xml", SHAPE_PICTURE, false},
 };
 enum { FORMAT_COUNT = sizeof FORMATS / sizeof *FORMATS };
@@ -43,16 +50,18 @@ typedef struct mesh_kind {
     const char *rows, *triangles, *bytes; /* SQL */
 } mesh_kind;
 
-/* The last columns tell of the whole mesh, and stand once in the answer. */
-enum { ROW_COLUMNS = 5 };
-static const mesh_kind RANGE = {
-    "SELECT x, y, z, error, level, achieved_eps FROM rqt_range(:region, :eps, :terrain, :options)",
-    "SELECT * FROM rqt_triangles(:region, :eps, :terrain, :options)",
-    "SELECT rqt_mesh(:region, :eps, :format, :terrain, :options)"};
-static const mesh_kind VIEW = {
-    "SELECT x, y, z, error, level, achieved_tau, guaranteed FROM rqt_view(:camera, :terrain, :options)",
-    "SELECT * FROM rqt_view_triangles(:camera, :terrain, :options)",
-    "SELECT rqt_view_mesh(:camera, :format, :terrain, :options)"};
+/* The last columns tell of the whole mesh. */
+enum { ROW_COLUMNS = 5, TRIANGLE_COLUMNS = 10 };
+#define OF_RANGE "vertices, triangles, achieved_eps"
+#define OF_VIEW "vertices, triangles, achieved_tau, guaranteed, token"
+static const mesh_kind RANGE = {"SELECT x, y, z, error, level, " OF_RANGE
+                                " FROM rqt_range(:region, :eps, :terrain, :options)",
+                                "SELECT *, " OF_RANGE " FROM rqt_triangles(:region, :eps, :terrain, :options)",
+                                "SELECT * FROM rqt_answer(:region, :eps, :format, :terrain, :options)"};
+static const mesh_kind VIEW = {"SELECT x, y, z, error, level, " OF_VIEW
+                               " FROM rqt_view(:camera, :terrain, :options)",
+                               "SELECT *, " OF_VIEW " FROM rqt_view_triangles(:camera, :terrain, :options)",
+                               "SELECT * FROM rqt_view_answer(:camera, :format, :terrain, :options)"};
 
 static const mesh_format *by_name(request *r, const char *name) {
     for (int i = 0; i < FORMAT_COUNT; i++)
@@ -87,7 +96,7 @@ static const mesh_format *choose_format(request *r, bool *by_accept) {
 
 /* {"columns":[...],"rows":[[...],...],"achieved_eps":10} */
 static int write_rows(request *r, sqlite3_stmt *rows) {
-    buffer *b = &r->answer.body, told = {.most = 256};
+    buffer *b = &r->answer.body, told = {.most = 1024};
     const int columns = sqlite3_column_count(rows);
     int code, count = 0;
     buffer_text(b, "{\"columns\":[");
@@ -96,8 +105,9 @@ static int write_rows(request *r, sqlite3_stmt *rows) {
     while ((code = sqlite3_step(rows)) == SQLITE_ROW && !b->is_over) {
         for (int i = ROW_COLUMNS; i < columns && count == 0; i++) {
             buffer_format(&told, ",\"%s\":", sqlite3_column_name(rows, i));
-            buffer_number(&told, sqlite3_column_double(rows, i));
+            answer_value(&told, rows, i);
         }
+        if (count == 0) answer_tell(r, rows, ROW_COLUMNS);
         buffer_text(b, count++ ? ",\n" : "\n");
         answer_row(b, rows, 0, ROW_COLUMNS);
     }
@@ -119,6 +129,7 @@ static int write_features(request *r, sqlite3_stmt *rows, int srid) {
                       srid);
     buffer_text(b, "\"features\":[");
     while ((code = sqlite3_step(rows)) == SQLITE_ROW && !b->is_over) {
+        if (count == 0) answer_tell(r, rows, TRIANGLE_COLUMNS);
         buffer_format(b,
                       "%s{\"type\":\"Feature\",\"id\":%lld,\"properties\":null,\"geometry\":{\"type\":\"Polygon\","
                       "\"coordinates\":[[",
@@ -138,6 +149,7 @@ static int write_bytes(request *r, sqlite3_stmt *row) {
     if (code != SQLITE_ROW) return code;
     const void *bytes = sqlite3_column_blob(row, 0);
     buffer_add(&r->answer.body, bytes, (size_t)sqlite3_column_bytes(row, 0));
+    answer_tell(r, row, 1);
     return SQLITE_DONE;
 }
 
@@ -165,6 +177,17 @@ static void draw(request *r, const terrain *t, const query *q) {
     sqlite3_free(sentence);
 }
 
+/* A mesh without rows has told nothing; as a file it does. */
+static int tell_of_nothing(request *r, const terrain *t, const mesh_kind *kind, query q) {
+    q.format = "obj";
+    sqlite3_stmt *row = database_prepare(t->database, r, kind->bytes);
+    if (!row) return SQLITE_DONE; /* why is the answer */
+    query_bind(&q, row);
+    const int code = sqlite3_step(row);
+    if (code == SQLITE_ROW) answer_tell(r, row, 1);
+    return code;
+}
+
 static void run(request *r, const terrain *t, const mesh_kind *kind, const mesh_format *f, const query *q) {
     const char *sql = f->shape == SHAPE_ROWS       ? kind->rows
                       : f->shape == SHAPE_FEATURES ? kind->triangles
@@ -172,9 +195,11 @@ static void run(request *r, const terrain *t, const mesh_kind *kind, const mesh_
     sqlite3_stmt *statement = database_prepare(t->database, r, sql);
     if (!statement) return;
     query_bind(q, statement);
-    const int code = f->shape == SHAPE_ROWS       ? write_rows(r, statement)
-                     : f->shape == SHAPE_FEATURES ? write_features(r, statement, t->srid)
-                                                  : write_bytes(r, statement);
+    int code = f->shape == SHAPE_ROWS       ? write_rows(r, statement)
+               : f->shape == SHAPE_FEATURES ? write_features(r, statement, t->srid)
+                                            : write_bytes(r, statement);
+    if (code == SQLITE_DONE && f->shape != SHAPE_BYTES && !*r->answer.told[0])
+        code = tell_of_nothing(r, t, kind, *q);
     if (code != SQLITE_DONE && code != SQLITE_ROW) database_failed(t->database, r, code, NULL);
 }
 

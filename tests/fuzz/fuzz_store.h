@@ -202,6 +202,8 @@ static inline void take_value(input *in, char *text, size_t room) {
         "'gpkg'",
         "'spatialite'",
         "'glb'",
+        "'glb+normals'",
+        "'glb+quantized+normals'",
         "'{}'",
         "'[]'",
         "'{'",

@@ -112,8 +112,14 @@ SELECT rqt_mesh(NULL, 1, NULL);
 --! rqt_mesh(): format must be a text: one of strip indexed rqt obj
 SELECT rqt_mesh(NULL, 1, 7);
 --! rqt_mesh(): format must be a text
-SELECT rqt_mesh(NULL, 1, 'glb');
---! rqt_mesh(): format "glb" is not in this version
+SELECT rqt_mesh(NULL, 1, 'obj+quantized');
+--! rqt_mesh(): format "obj" is not quantized; glb can be
+SELECT rqt_mesh(NULL, 1, 'rqt+quantized+normals');
+--! rqt_mesh(): format "rqt" is not quantized; glb can be
+SELECT rqt_mesh(NULL, 1, 'glb+normals+quantized');
+--! rqt_mesh(): unknown format "glb+normals+quantized"; there are strip
+SELECT rqt_mesh(NULL, 1, 'strip+quantized');
+--! rqt_mesh(): format "strip" is not quantized; glb can be
 SELECT typeof(rqt_mesh(NULL, 1, 'rqt')), hex(substr(rqt_mesh(NULL, 1, 'rqt'), 1, 5));
 --> blob|5251545701
 

@@ -1,0 +1,70 @@
+// figures.js - what is told of the mesh in the picture: how many triangles, what they cost, and what is proved of them.
+
+import {bytes, count, metres, milliseconds, plain} from './format.js';
+
+const element = id => document.getElementById(id);
+
+/** Triangles of the mesh with all samples. */
+const allTriangles = ({width, height}) => 2 * (width - 1) * (height - 1);
+
+function share(shown, all) {
+    const percent = 100 * shown / all;
+    return `${percent < 0.1 ? 'under 0.1' : plain(percent)} % of the ${count(all)} of every sample`;
+}
+
+/** What the service proves of an answer, as a sentence; and is it what was asked for? */
+export function promiseOf({wish, told}) {
+    if (wish.ask === 'range') {
+        const eps = Number.isFinite(told.achievedEps) ? told.achievedEps : wish.asked;
+        return {isProved: true, short: metres(eps), text: eps > 0
+            ? `Proved: nowhere more than ${metres(eps)} from any sample.` : 'Proved: every sample is met exactly.'};
+    }
+    const tau = Number.isFinite(told.achievedTau) ? told.achievedTau : wish.asked;
+    const coarser = tau > wish.asked * 1.001 ? ` ${plain(wish.asked)} px would take more triangles than are asked for.` : '';
+    if (told.guaranteed === 0)
+        return {isProved: false, short: `about ${plain(tau)} px`, text: `About ${plain(tau)} px on screen; not proved for this view.`};
+    return {isProved: true, short: `${plain(tau)} px`, text: `Proved: no sample in the picture is off by more than ${plain(tau)} px.${coarser}`};
+}
+
+export class Figures {
+    constructor() {
+        this.values = new Map();
+        for (const name of ['Vertices', 'Received', 'Answer', 'Decoding', 'Frame', 'Eye above ground', 'Eye at']) {
+            const term = document.createElement('dt'), value = document.createElement('dd');
+            term.textContent = name;
+            value.textContent = '\u2013';
+            element('figures').append(term, value);
+            this.values.set(name, value);
+        }
+    }
+
+    set(name, text) {
+        const value = this.values.get(name);
+        if (value.textContent !== text) value.textContent = text;
+    }
+
+    /** @param stage of stream.js @param terrain as service.js has it */
+    showStage(stage, terrain) {
+        const {vertexCount, triangleCount} = stage.mesh, promise = promiseOf(stage);
+        element('triangles').textContent = count(triangleCount);
+        element('share').textContent = share(triangleCount, allTriangles(terrain.terrain));
+        element('promise').textContent = promise.text;
+        element('promise').classList.toggle('unproved', !promise.isProved);
+        element('summary').textContent = `${count(triangleCount)} triangles, ${promise.short}`;
+        this.set('Vertices', count(vertexCount));
+        this.set('Received', `${bytes(stage.bytes)}, ${plain(8 * stage.bytes / Math.max(1, vertexCount))} bits a vertex`);
+        this.set('Answer', milliseconds(stage.milliseconds.answer));
+        this.set('Decoding', milliseconds(stage.milliseconds.decode));
+    }
+
+    /** @param rate frames a second, or 0 when nothing moves @param cost milliseconds of a frame */
+    showFrame(rate, cost) {
+        const text = rate ? `${plain(rate)} a second` : 'at rest';
+        this.set('Frame', cost ? `${milliseconds(cost)}, ${text}` : text);
+    }
+
+    showEye(clearance, place) {
+        this.set('Eye above ground', Number.isNaN(clearance) ? '\u2013' : metres(clearance));
+        this.set('Eye at', place);
+    }
+}

@@ -1,0 +1,188 @@
+// browser.mjs - headless Chromium with software WebGL, and a page in it whose every complaint is kept.
+import {mkdirSync, writeFileSync} from 'node:fs';
+import {join} from 'node:path';
+import {ROOT, requirePackage} from './packages.mjs';
+import {decodePng, findGaps} from './picture.mjs';
+import {vanishingPoint} from './space.mjs';
+
+const {chromium} = requirePackage('playwright-core');
+const SHOTS = process.env.WEB_SHOTS || join(ROOT, 'build', 'web-shots');
+/** Milliseconds until a wait is given up: no measure of anything. */
+export const PATIENCE = 120000;
+/** What the terrain never has: the background of the pictures in which gaps are looked for. */
+const BACKGROUND = [1, 0, 1];
+
+export const DESKTOP = {width: 1280, height: 800}, PHONE = {width: 360, height: 640, touch: true}, SMALL = {width: 480, height: 320};
+
+export function launch() {
+    return chromium.launch({
+        executablePath: process.env.CHROMIUM || '/usr/bin/chromium',
+        args: ['--headless', '--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--disable-background-networking'],
+    });
+}
+
+/**
+ * Opens a page of the service and waits for the viewer.
+ *
+ * `problems` collects what a clean page has none of: errors and warnings of the console, exceptions, requests that failed (but
+ * for those that the page took back itself) and requests to anyone but the service. `record`: after every frame, the gaps in
+ * it are looked for (frames()). `slow`: so many times slower does the time of the page go, so that what takes a moment has many frames.
+ */
+export async function openPage(browser, service, {width, height, touch = false, path = '', record = false, slow = 1, prepare = async () => {}} = DESKTOP) {
+    const context = await browser.newContext({viewport: {width, height}, hasTouch: touch, isMobile: touch, deviceScaleFactor: 1});
+    const page = await context.newPage();
+    page.setDefaultTimeout(PATIENCE);
+    const problems = [], asked = [];
+    const origin = new URL(service.url).origin;
+    page.on('console', message => {
+        if (['error', 'warning', 'assert'].includes(message.type())) problems.push(`console: ${message.text()}`);
+    });
+    page.on('pageerror', error => problems.push(`exception: ${error.stack}`));
+    page.on('request', request => {
+        const url = new URL(request.url());
+        if (!['blob:', 'data:'].includes(url.protocol) && url.origin !== origin) problems.push(`request to ${request.url()}`);
+        asked.push(url);
+    });
+    page.on('requestfailed', request => {
+        const why = request.failure()?.errorText;
+        if (why !== 'net::ERR_ABORTED') problems.push(`${request.url()}: ${why}`);
+    });
+    page.on('response', response => {
+        if (response.status() >= 400) problems.push(`${response.url()}: ${response.status()}`);
+    });
+    if (record) await page.addInitScript(recordFrames, {findGaps: findGaps.toString(), vanishingPoint: vanishingPoint.toString(), background: BACKGROUND, slow});
+    await prepare(page);
+    await page.goto(service.url + path);
+    await page.waitForFunction(() => window.rqtViewer?.ready);
+    return Object.assign(new View(), {page, context, problems, asked});
+}
+
+export class View {
+    /** The page's own account of what it shows. */
+    state() {
+        return this.page.evaluate(() => window.rqtViewer.state());
+    }
+
+    async setCamera(camera) {
+        await this.page.evaluate(c => window.rqtViewer.setCamera(c), camera);
+    }
+
+    /** Until nothing is under way: the mesh for this camera is there, and no vertex moves. */
+    async settled() {
+        await this.page.evaluate(() => window.rqtViewer.settled());
+    }
+
+    /** Moves, and is there. */
+    async see(camera) {
+        await this.setCamera(camera);
+        await this.settled();
+        return this.state();
+    }
+
+    /** The canvas alone, without what lies over it: a picture. */
+    async picture() {
+        const style = 'body * { visibility: hidden !important } canvas { visibility: visible !important }';
+        return decodePng(await this.page.screenshot({style}));
+    }
+
+    /** The page as people see it, kept in build/web-shots. */
+    async shot(name) {
+        mkdirSync(SHOTS, {recursive: true});
+        await this.page.screenshot({path: join(SHOTS, `${name}.png`)});
+    }
+
+    /** What recordFrames saw since the last call: [{count, at, terrain, ...}] with one entry a frame. */
+    frames() {
+        return this.page.evaluate(() => window.recordedFrames.splice(0));
+    }
+
+    /** The mesh that is shown, as the page's decoder made it: its arrays of numbers, and what stands in its header. */
+    async mesh() {
+        const found = await this.page.evaluate(() => {
+            const base64 = array => {
+                const bytes = new Uint8Array(array.buffer, array.byteOffset, array.byteLength);
+                let text = '';
+                for (let i = 0; i < bytes.length; i += 8192) text += String.fromCharCode(...bytes.subarray(i, i + 8192));
+                return {kind: array.constructor.name, base64: btoa(text)};
+            };
+            return Object.entries(window.rqtViewer.mesh()).map(([name, value]) => [name, ArrayBuffer.isView(value) ? base64(value) : value]);
+        });
+        const kinds = {Int8Array, Uint8Array, Int32Array, Uint32Array, Float32Array, Float64Array};
+        return Object.fromEntries(found.map(([name, value]) => {
+            if (!value?.base64) return [name, value];
+            const bytes = Uint8Array.from(Buffer.from(value.base64, 'base64'));
+            return [name, new kinds[value.kind](bytes.buffer)];
+        }));
+    }
+
+    /** What the page last asked for with this word in the path: {path, parameters}. */
+    lastAsked(word) {
+        const url = this.asked.filter(u => u.pathname.includes(word)).at(-1);
+        return url && {path: url.pathname + url.search, parameters: Object.fromEntries(url.searchParams)};
+    }
+
+    async close() {
+        await this.context.close();
+    }
+}
+
+/** A test's body that keeps a picture of the page when it fails. */
+export function keepingShots(name, views, body) {
+    return async t => {
+        try {
+            await body(t);
+        } catch (error) {
+            for (const [i, view] of views().entries()) await view.shot(`FAILED ${name} ${i}`.replace(/[^\w.-]+/g, '_')).catch(() => {});
+            throw error;
+        }
+    };
+}
+
+export function keepText(name, text) {
+    mkdirSync(SHOTS, {recursive: true});
+    writeFileSync(join(SHOTS, name), text);
+}
+
+/**
+ * In the page, before its own scripts: paints the background in a colour of its own and reads the canvas after each frame,
+ * within the same task, as it will be shown. A pixel with a share of that colour counts as background: edges are smoothed.
+ *
+ * window.leaveOut = n leaves the n-th triangle out of what is drawn.
+ */
+function recordFrames({findGaps, vanishingPoint, background, slow}) {
+    const make = text => new Function(`return (${text})`)();
+    const gapsOf = make(findGaps), vanishing = make(vanishingPoint), gl = WebGL2RenderingContext.prototype;
+    const {clearColor, drawElements} = gl, copy = document.createElement('canvas');
+    const request = window.requestAnimationFrame.bind(window), now = performance.now.bind(performance);
+    let drawn = null;
+    window.recordedFrames = [];
+    window.pictures = [];
+    performance.now = () => now() / slow;
+    gl.clearColor = function () {
+        clearColor.call(this, ...background, 1);
+    };
+    gl.drawElements = function (mode, count, type, offset) {
+        drawn = this.canvas;
+        if (mode !== this.TRIANGLES || !(window.leaveOut < count / 3)) return drawElements.call(this, mode, count, type, offset);
+        const before = 3 * window.leaveOut, size = type === this.UNSIGNED_INT ? 4 : 2;
+        if (before) drawElements.call(this, mode, before, type, offset);
+        if (before + 3 < count) drawElements.call(this, mode, count - before - 3, type, offset + (before + 3) * size);
+    };
+    const look = () => {
+        if (!drawn) return;
+        const {width, height} = drawn;
+        if (width !== copy.width || height !== copy.height) Object.assign(copy, {width, height});
+        const context = copy.getContext('2d', {willReadFrequently: true});
+        context.drawImage(drawn, 0, 0);
+        drawn = null;
+        const {data} = context.getImageData(0, 0, width, height), shows = new Uint8Array(width * height);
+        for (let i = 0; i < shows.length; i++) shows[i] = Math.min(data[4 * i], data[4 * i + 2]) - data[4 * i + 1] > 24 ? 1 : 0;
+        const {camera} = window.rqtViewer.state();
+        window.recordedFrames.push({...gapsOf(shows, width, height, vanishing({...camera, width, height})), camera});
+        if (window.keepPictures) window.pictures.push(new Uint32Array(data.buffer));
+    };
+    window.requestAnimationFrame = callback => request(() => {
+        callback(performance.now());
+        look();
+    });
+}
