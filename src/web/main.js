@@ -115,7 +115,7 @@ class Viewer {
         this.stage = null;
         this.scene = createScene(terrain.terrain.crs);
         // The same object for the same terrain: by this the worker knows it.
-        terrain.forWorker ||= (({crs, width, height, x0, y0, dx, dy}) => ({crs, width, height, x0, y0, dx, dy}))(terrain.terrain);
+        terrain.forWorker ||= {isSpace: this.scene.isSpace, metre: this.scene.metre};
         this.camera = new Camera(this.scene);
         this.orbit = new Orbit(this.camera, at => this.pointAt(at));
         this.fly = new Fly(this.camera, () => this.clearance());
