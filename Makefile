@@ -108,10 +108,11 @@ $(BUILD)/generated/schema_sql.h: sql/schema.sql sql/terrain.sql sql/fill.sql sql
 demo: all ## import a real DEM and show what rqt does with it; pictures in build/demo
 	@BUILD=$(BUILD) ./examples/demo.sh
 
+PORT ?= 8080
 .PHONY: serve-demo
-serve-demo: all ## the query service and its page on the demo's terrain, at http://127.0.0.1:8080/
+serve-demo: all ## the query service and its page on the demo's terrain, at http://127.0.0.1:8080/ (PORT=0: where it is free)
 	@[ -e $(BUILD)/demo/white-mountains.gpkg ] || $(MAKE) --no-print-directory demo
-	@$(BUILD)/rqt serve $(BUILD)/demo/white-mountains.gpkg
+	@$(BUILD)/rqt serve --port $(PORT) $(BUILD)/demo/white-mountains.gpkg
 
 # ------------------------------------------------------------------------------------------------------ tests
 # Everything that a test may want of us in one archive; the linker takes what each one needs.

@@ -31,7 +31,8 @@ ask = service.ask
 s.check("the service says where it listens, on this machine alone", re.fullmatch(r"http://127\.0\.0\.1:\d+/", service.url), service.url)
 
 # ------------------------------------------------------------------------------------------- meshes, byte for byte
-TYPES = {"rqt": "application/vnd.rqt.mesh", "rqt+normals": "application/vnd.rqt.mesh", "obj": "model/obj", "ply": "application/x-ply",
+TYPES = {"rqt": "application/vnd.rqt.mesh", "rqt+normals": "application/vnd.rqt.mesh", "rqt+errors": "application/vnd.rqt.mesh",
+         "rqt+normals+errors": "application/vnd.rqt.mesh", "obj": "model/obj", "ply": "application/x-ply",
          "ply+normals": "application/x-ply", "strip": "application/vnd.rqt.strip", "indexed": "application/vnd.rqt.indexed",
          "wkb": "application/vnd.rqt.wkb"}
 TYPES.update((name, "model/gltf-binary") for name in ("glb", "glb+normals", "glb+quantized", "glb+quantized+normals"))
@@ -620,7 +621,7 @@ busy = socket.socket()
 busy.bind(("127.0.0.1", 0))
 busy.listen()
 said, code = s.run([s.RQT, "serve", "--port", str(busy.getsockname()[1]), DB])
-check("a port that is taken", code == 1 and "Address already in use" in said, (code, said))
+check("a port that is taken", code == 1 and "Address already in use (--port 0 takes one that is free)" in said, (code, said))
 busy.close()
 service = Service("--bind", "::1", DB)
 check("IPv6", re.fullmatch(r"http://\[::1\]:\d+/", service.url), service.url)

@@ -38,7 +38,7 @@ static void take_argument(input *in, const char *name, size_t n, char *text, siz
           "'{\"select\":\"bottomup\"}'", "'{\"outline\":\"tol\"}'", "'{\"max_vertices\":60}'",
           "'{\"mode\":\"border\"}'", "'{\"mode\":\"cut\",\"strip\":\"fan\"}'"}},
         {"format",
-         {"'strip'", "'rqt+normals'", "'rqt'", "'obj'", "'ply+normals'", "'increment'", "'gpkg'", "'spatialite'"}},
+         {"'strip'", "'rqt+normals+errors'", "'rqt'", "'obj'", "'ply+normals'", "'increment'", "'gpkg'", "'spatialite'"}},
         {"blob",
          {"(SELECT data FROM rqt_block_1 LIMIT 1)", "(SELECT data FROM rqt_block_2 ORDER BY id DESC LIMIT 1)",
           "zeroblob(41)", "(SELECT data FROM rqt_block_1 LIMIT 1 OFFSET 9)",

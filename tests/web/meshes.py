@@ -83,4 +83,19 @@ def views():
             token = blob[at:at + size].decode()
 
 
-{"wire": wire, "views": views}[sys.argv[2]]()
+def morph():
+    """Of each terrain meshes of several eps, the first exact; and views."""
+    window = "POLYGON((13.2 -9.7, 51.4 -9.7, 41.4 -40.1, 13.2 -40.1, 13.2 -9.7))"
+    for name, width, height, block, voids, region in (("square", 33, 33, 3, 0, None), ("large", 65, 65, 5, 0, None), ("oblong", 61, 37, 3, 0, None),
+                                                      ("wide", 40, 35, 4, 0, None), ("thin", 5, 47, 2, 0, None), ("void", 33, 33, 3, 90, None),
+                                                      ("clamped void", 50, 40, 4, 60, None), ("window", 65, 65, 4, 0, window), ("tiny", 2, 3, None, 0, None)):
+        options = {} if block is None else {"block": block}
+        db = grid_terrain(name.replace(" ", "_"), s.rough_grid(width, height, width + 3 * height, voids), **options)
+        for eps in (0, 2, 8, 25, 1000):
+            put("M", "%s eps %d" % (name, eps), one(db, "SELECT rqt_mesh(?, ?, 'rqt', NULL, '{\"outline\":\"tol\"}')", region, eps))
+        for n in range(3 if width > 30 else 0):
+            view = camera(20 + 10 * n, -height - 20, 150, yaw=20 * n - 20, pitch=-35, tau=6 - n)
+            put("M", "%s view %d" % (name, n), one(db, "SELECT rqt_view_mesh(?, 'rqt')", view))
+
+
+{"wire": wire, "views": views, "morph": morph}[sys.argv[2]]()
