@@ -64,7 +64,7 @@ export function edgesOf(triangles) {
 /**
  * @param mesh of wire.js
  * @param {Place} place with the exaggeration to be shown
- * @param origin a point of the scene
+ * @param {Vector} origin a point of the scene
  * @return {{origin, positions, heights, normals, errors, triangles, boxes, edges}}: what terrain_layer.js shows
  */
 export function buildGeometry(mesh, place, origin, withEdges) {
@@ -78,5 +78,38 @@ export function buildGeometry(mesh, place, origin, withEdges) {
         triangles: mesh.triangles,
         boxes: boxesOf(positions, mesh.triangles),
         edges: withEdges ? edgesOf(mesh.triangles) : null,
+    };
+}
+
+/**
+ * What a geomorph shows: the union of two meshes, with where its vertices begin and end.
+ * @param union of morph.js
+ * @param a the mesh it begins with, b the one it ends with
+ * @param {Place} placeFrom with the exaggeration at its beginning, placeTo with that at its end
+ */
+export function buildMorph(union, a, b, placeFrom, placeTo, origin, withEdges) {
+    const {vertexCount, from, to, triangles} = union, ofA = a.normals && unpackNormals(a.normals);
+    const ofB = b.normals && unpackNormals(b.normals), normals = new Int8Array(4 * vertexCount);
+    const errors = a.errors && b.errors ? new Float32Array(vertexCount) : null;
+    for (let v = 0; v < vertexCount; v++) {
+        // A vertex has one normal and one error, whatever mesh it is in; one that is in neither is level with others.
+        const source = to[v] >= 0 ? ofB : ofA, i = to[v] >= 0 ? to[v] : from[v];
+        if (i < 0) {
+            normals[4 * v + 2] = 127;
+            continue;
+        }
+        for (let axis = 0; axis < 3; axis++) normals[4 * v + axis] = source[4 * i + axis];
+        if (errors) errors[v] = (to[v] >= 0 ? b : a).errors[i];
+    }
+    return {
+        origin,
+        positions: placeTo.positionsOf(union, origin, union.zTo),
+        positionsFrom: placeFrom.positionsOf(union, origin, union.zFrom),
+        heights: metresAll(union, union.zTo),
+        heightsFrom: metresAll(union, union.zFrom),
+        normals,
+        errors,
+        triangles,
+        edges: withEdges ? edgesOf(triangles) : null,
     };
 }
