@@ -8,7 +8,7 @@ import {vanishingPoint} from './space.mjs';
 const {chromium} = requirePackage('playwright-core');
 const SHOTS = process.env.WEB_SHOTS || join(ROOT, 'build', 'web-shots');
 /** Milliseconds until a wait is given up: no measure of anything. */
-export const PATIENCE = 120000;
+export const PATIENCE = Number(process.env.WEB_PATIENCE || 60000);
 /** What the terrain never has: the background of the pictures in which gaps are looked for. */
 const BACKGROUND = [1, 0, 1];
 
@@ -53,14 +53,15 @@ export async function openPage(browser, service, {width, height, touch = false, 
     if (record) await page.addInitScript(recordFrames, {findGaps: findGaps.toString(), vanishingPoint: vanishingPoint.toString(), background: BACKGROUND, slow});
     await prepare(page);
     await page.goto(service.url + path);
-    await page.waitForFunction(() => window.rqtViewer?.ready);
+    await page.evaluate(() => window.rqtViewer.ready);
     return Object.assign(new View(), {page, context, problems, asked});
 }
 
 export class View {
-    /** The page's own account of what it shows. */
-    state() {
-        return this.page.evaluate(() => window.rqtViewer.state());
+    /** The page's own account of what it shows: camera, terrain, settings and figures, in one. */
+    async state() {
+        const {settings, figures, ...state} = await this.page.evaluate(() => window.rqtViewer.state());
+        return {...settings, ...figures, ...state};
     }
 
     async setCamera(camera) {
@@ -177,7 +178,8 @@ function recordFrames({findGaps, vanishingPoint, background, slow}) {
         drawn = null;
         const {data} = context.getImageData(0, 0, width, height), shows = new Uint8Array(width * height);
         for (let i = 0; i < shows.length; i++) shows[i] = Math.min(data[4 * i], data[4 * i + 2]) - data[4 * i + 1] > 24 ? 1 : 0;
-        const {camera} = window.rqtViewer.state();
+        const camera = window.rqtViewer.state?.().camera;
+        if (!camera) return;
         window.recordedFrames.push({...gapsOf(shows, width, height, vanishing({...camera, width, height})), camera});
         if (window.keepPictures) window.pictures.push(new Uint32Array(data.buffer));
     };
