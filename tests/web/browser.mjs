@@ -92,6 +92,12 @@ export class View {
         await this.page.screenshot({path: join(SHOTS, `${name}.png`)});
     }
 
+    /** Keeps the first frames that had gaps, too. */
+    async keepGaps(name) {
+        const found = await this.page.evaluate(() => window.withGaps || []);
+        found.forEach((url, i) => writeFileSync(join(SHOTS, `${name}-gap${i}.png`), Buffer.from(url.split(',')[1], 'base64')));
+    }
+
     /** What recordFrames saw since the last call: [{count, at, terrain, ...}] with one entry a frame. */
     frames() {
         return this.page.evaluate(() => window.recordedFrames.splice(0));
@@ -133,15 +139,11 @@ export function keepingShots(name, views, body) {
         try {
             await body(t);
         } catch (error) {
-            for (const [i, view] of views().entries()) await view.shot(`FAILED ${name} ${i}`.replace(/[^\w.-]+/g, '_')).catch(() => {});
+            const file = `FAILED-${name}`.replace(/[^\w.-]+/g, '-');
+            for (const view of views()) await view.shot(file).then(() => view.keepGaps(file)).catch(() => {});
             throw error;
         }
     };
-}
-
-export function keepText(name, text) {
-    mkdirSync(SHOTS, {recursive: true});
-    writeFileSync(join(SHOTS, name), text);
 }
 
 /**
@@ -157,6 +159,7 @@ function recordFrames({findGaps, vanishingPoint, background, slow}) {
     const request = window.requestAnimationFrame.bind(window), now = performance.now.bind(performance);
     let drawn = null;
     window.recordedFrames = [];
+    window.withGaps = [];
     window.pictures = [];
     performance.now = () => now() / slow;
     gl.clearColor = function () {
@@ -180,7 +183,9 @@ function recordFrames({findGaps, vanishingPoint, background, slow}) {
         for (let i = 0; i < shows.length; i++) shows[i] = Math.min(data[4 * i], data[4 * i + 2]) - data[4 * i + 1] > 24 ? 1 : 0;
         const camera = window.rqtViewer.state?.().camera;
         if (!camera) return;
-        window.recordedFrames.push({...gapsOf(shows, width, height, vanishing({...camera, width, height})), camera});
+        const found = gapsOf(shows, width, height, vanishing({...camera, width, height}));
+        window.recordedFrames.push({...found, camera});
+        if (found.count && window.withGaps.length < 3) window.withGaps.push(copy.toDataURL());
         if (window.keepPictures) window.pictures.push(new Uint32Array(data.buffer));
     };
     window.requestAnimationFrame = callback => request(() => {
