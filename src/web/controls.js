@@ -48,7 +48,7 @@ export class Controls {
 
     down(event) {
         this.element.setPointerCapture(event.pointerId);
-        this.element.focus({preventScroll: true});
+        document.activeElement?.blur(); // keys move the camera now, and not the slider that was used last
         const at = this.pixelsOf(event);
         this.pointers.set(event.pointerId, at);
         this.press = this.pointers.size === 1 && event.button === 0 ? {at, time: event.timeStamp} : null;

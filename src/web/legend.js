@@ -19,9 +19,9 @@ function show(ramps, ticks) {
     }));
 }
 
-/** @param heights [lowest, highest] in metres @param errors the same, of a mesh, or null */
+/** @param heights [lowest, highest] in metres @param errors the same of a mesh that has them */
 export function showLegend(colouring, heights, errors) {
-    legend.hidden = colouring === 'plain' || colouring === 'error' && !errors;
+    legend.hidden = colouring === 'plain';
     if (legend.hidden) return;
     const [low, high] = colouring === 'relief' ? heights : errors;
     if (colouring === 'error')

@@ -115,7 +115,7 @@ class Viewer {
         this.stage = null;
         this.scene = createScene(terrain.terrain.crs);
         // The same object for the same terrain: by this the worker knows it.
-        terrain.forWorker ||= (({crs, width, height, x0, y0, dx, dy}) => ({crs, width, height, x0, y0, dx, dy}))(terrain.terrain);
+        terrain.forWorker ||= {isSpace: this.scene.isSpace, metre: this.scene.metre};
         this.camera = new Camera(this.scene);
         this.orbit = new Orbit(this.camera, at => this.pointAt(at));
         this.fly = new Fly(this.camera, () => this.clearance());
@@ -187,17 +187,19 @@ class Viewer {
     changed() {
         const {uniforms} = this.layer, {settings, terrain} = this;
         this.panel.show({...settings, terrain: terrain.id}, terrain);
-        uniforms.colouring.value = COLOURINGS.indexOf(settings.colour);
         uniforms.exaggeration.value = settings.exaggeration;
         uniforms.heightRange.value.set(terrain.terrain.min_z, terrain.terrain.max_z);
         element('picture').classList.toggle('measuring', settings.tool === 'profile');
-        this.showLegend();
+        this.paint();
         this.redraw();
     }
 
-    showLegend() {
+    /** Colours as they are wanted and can be: errors come with the next mesh only. */
+    paint() {
         const {min_z: lowest, max_z: highest} = this.terrain.terrain, errors = this.stage?.errorRange;
-        showLegend(this.settings.colour, [lowest, highest], errors);
+        const colour = this.settings.colour === 'error' && !errors ? 'plain' : this.settings.colour;
+        this.layer.uniforms.colouring.value = COLOURINGS.indexOf(colour);
+        showLegend(colour, [lowest, highest], errors);
         if (errors) this.layer.uniforms.errorRange.value.set(Math.log2(errors[0]), Math.log2(errors[1]));
     }
 
@@ -277,7 +279,7 @@ class Viewer {
         this.layer.show(stage, performance.now());
         this.figures.showStage(stage, this.terrain);
         element('bare').href = stage.wish.path;
-        this.showLegend();
+        this.paint();
         this.fail('');
         this.redraw();
         while (this.layer.isMoving) await new Promise(resolve => requestAnimationFrame(resolve));
