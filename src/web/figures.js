@@ -1,6 +1,6 @@
 // figures.js - what is told of the mesh in the picture: how many triangles, what they cost, and what is proved of them.
 
-import {bytes, count, metres, milliseconds, plain} from './format.js';
+import {bytes, count, metres, milliseconds, pixels, plain} from './format.js';
 
 const element = id => document.getElementById(id);
 
@@ -12,18 +12,19 @@ function share(shown, all) {
     return `${percent < 0.01 ? 'under 0.01' : plain(percent)} % of the full resolution's ${count(all)}`;
 }
 
-/** What the service proves of an answer, as a sentence; and is it what was asked for? */
+/** What the service proves of an answer, as a sentence; and does it prove anything? */
 export function promiseOf({wish, told}) {
-    if (wish.ask === 'range') {
-        const eps = Number.isFinite(told.achievedEps) ? told.achievedEps : wish.asked;
-        return {isProved: true, short: metres(eps), text: eps > 0
-            ? `Proved: nowhere more than ${metres(eps)} from any sample.` : 'Proved: every sample is met exactly.'};
+    const isRange = wish.ask === 'range', unit = isRange ? metres : pixels;
+    const reached = isRange ? told.achievedEps : told.achievedTau, tolerance = Number.isFinite(reached) ? reached : wish.asked;
+    const coarser = tolerance > wish.asked * 1.001 ? ` ${unit(wish.asked)} would take too many triangles.` : '';
+    if (isRange) {
+        const text = tolerance > 0 ? `nowhere more than ${unit(tolerance)} from any sample` : 'every sample is met exactly';
+        return {isProved: true, short: unit(tolerance), text: `Proved: ${text}.${coarser}`};
     }
-    const tau = Number.isFinite(told.achievedTau) ? told.achievedTau : wish.asked;
-    const coarser = tau > wish.asked * 1.001 ? ` ${plain(wish.asked)} px would take more triangles than are asked for.` : '';
     if (told.guaranteed === 0)
-        return {isProved: false, short: `about ${plain(tau)} px`, text: `About ${plain(tau)} px on screen; not proved for this view.`};
-    return {isProved: true, short: `${plain(tau)} px`, text: `Proved: no sample in the picture is off by more than ${plain(tau)} px.${coarser}`};
+        return {isProved: false, short: `about ${unit(tolerance)}`, text: `About ${unit(tolerance)} on screen, not proved.${coarser}`};
+    const text = `Proved: no sample in the picture is off by more than ${unit(tolerance)}.${coarser}`;
+    return {isProved: true, short: unit(tolerance), text};
 }
 
 export class Figures {

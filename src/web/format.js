@@ -15,6 +15,8 @@ export function plain(value) {
 export const metres = value =>
     Math.abs(value) >= 10000 ? `${plain(value / 1000)}\u00a0km` : `${plain(value)}\u00a0m`;
 
+export const pixels = value => `${plain(value)}\u00a0px`;
+
 /** A height as a surveyor reads it: to the centimetre. */
 export const height = value => `${value.toFixed(2)}\u00a0m`;
 

@@ -34,7 +34,6 @@ import {Stream} from './stream.js';
 import {TerrainLayer} from './terrain_layer.js';
 import {place as placeText} from './format.js';
 
-const MOST_TRIANGLES = 400000; // a phone shows them
 const CLEARANCE = 1.7; // metres: the eye does not get into the ground
 const USUAL = {ask: 'view', tau: 1, eps: 5, colour: 'relief', wires: false, morph: true, mode: 'orbit', tool: 'height', exaggeration: 1};
 
@@ -144,11 +143,13 @@ class Viewer {
 
     turnNorth() {
         const yaw = this.camera.yaw > 180 ? this.camera.yaw - 360 : this.camera.yaw, isOrbit = this.settings.mode === 'orbit';
-        this.orbit.begin([0, 0]);
+        const anchor = this.orbit.pointAt([0, 0]);
         let done = 0;
         this.glide.begin(t => {
             if (isOrbit) {
+                this.orbit.anchor = anchor;
                 this.orbit.turn((t - done) * yaw * Math.PI / 180, 0);
+                this.orbit.end();
                 if (t === 1) this.camera.yaw = 0;
             } else {
                 this.camera.turn(-(t - done) * yaw, 0);
@@ -265,8 +266,8 @@ class Viewer {
         const {camera, terrain, settings: {ask, tau, eps, wires, morph, colour, exaggeration}} = this;
         const format = colour === 'error' ? 'rqt+normals+errors' : 'rqt+normals';
         return {
-            path: ask === 'view' ? viewPath(terrain.id, camera.json(tau), format, MOST_TRIANGLES)
-                : rangePath(terrain.id, eps, format, MOST_TRIANGLES),
+            path: ask === 'view' ? viewPath(terrain.id, camera.json(tau), format)
+                : rangePath(terrain.id, eps, format),
             terrain: terrain.forWorker, exaggeration, origin: camera.eye, withEdges: wires,
             withMorph: morph && !isStill.matches, ask, asked: ask === 'view' ? tau : eps,
         };
@@ -300,7 +301,7 @@ class Viewer {
 
     frame(now) {
         requestAnimationFrame(next => this.frame(next));
-        const {frames} = this, seconds = Math.min(0.1, (now - frames.last) / 1000);
+        const {frames} = this, seconds = Math.min(0.2, (now - frames.last) / 1000);
         frames.last = now;
         const isKeyed = this.controls.step(seconds, this.settings.mode === 'fly');
         if (isKeyed) this.moved();
@@ -422,14 +423,11 @@ class Viewer {
     }
 }
 
-/** Least and greatest of the errors that are not 0, in metres; null where there are none. */
+/** Errors between which most of a mesh's vertices are, in metres; null where it has none. */
 function rangeOf(errors) {
     if (!errors) return null;
-    let low = Infinity, high = 0;
-    for (const error of errors) {
-        if (error > 0 && error < low) low = error;
-        if (error > high && error < Infinity) high = error;
-    }
+    const sorted = errors.filter(error => error > 0 && error < Infinity).sort(), {length: many} = sorted;
+    const low = sorted[Math.floor(many * 0.02)], high = sorted[Math.floor(many * 0.98)];
     return low < high ? [low, high] : [0.1, 1];
 }
 
@@ -441,6 +439,7 @@ function excuse(sentence) {
     box.firstChild.textContent = sentence;
     element('stage').append(box);
     for (const id of ['hint', 'corner', 'panel']) element(id).hidden = true;
+    document.body.className = 'bare';
 }
 
 async function begin() {
@@ -449,18 +448,17 @@ async function begin() {
         terrains = await askTerrains();
     } catch (problem) {
         excuse(problem.message);
-        return;
+        return undefined;
     }
     if (!terrains.length) {
         excuse('There is no terrain in the databases that are served.');
-        return;
+        return undefined;
     }
-    try {
-        return new Viewer(terrains).hook();
-    } catch (problem) {
-        console.warn(problem);
-        excuse('This browser shows no WebGL, which the viewer draws with. All else answers:');
+    if (!document.createElement('canvas').getContext('webgl2')) {
+        excuse('This browser shows no WebGL 2, which the viewer draws with. All else answers:');
+        return undefined;
     }
+    return new Viewer(terrains).hook();
 }
 
 const begun = begin();

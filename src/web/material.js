@@ -16,10 +16,10 @@ in float heightFrom;
 in float error;
 uniform float t;
 uniform float exaggeration;
-out vec3 shadingNormal;
-out float metres;
-out float metresOff;
-out float depth;
+centroid out vec3 shadingNormal;
+centroid out float metres;
+centroid out float metresOff;
+centroid out float depth;
 void main() {
     vec4 seen = modelViewMatrix * vec4(mix(from, position, t), 1.0);
     gl_Position = projectionMatrix * seen;
@@ -41,10 +41,10 @@ uniform float logDepthBufFC;
 uniform sampler2D land;
 uniform sampler2D sea;
 uniform sampler2D errors;
-in vec3 shadingNormal;
-in float metres;
-in float metresOff;
-in float depth;
+centroid in vec3 shadingNormal;
+centroid in float metres;
+centroid in float metresOff;
+centroid in float depth;
 out vec4 colour;
 
 vec3 tint() {
@@ -79,7 +79,7 @@ const EDGE_FRAGMENT = /* glsl */ `
 precision highp float;
 uniform vec4 edgeColour;
 uniform float logDepthBufFC;
-in float depth;
+centroid in float depth;
 out vec4 colour;
 void main() {
     colour = edgeColour;
@@ -97,7 +97,7 @@ export function createMaterials() {
         hazeDistance: {value: 1e9},
         hazeColour: {value: [1, 1, 1]},
         wires: {value: 0},
-        edgeColour: {value: [0.05, 0.07, 0.1, 0.45]},
+        edgeColour: {value: [0.05, 0.07, 0.1, 0.38]},
         land: {value: rampTexture(LAND)},
         sea: {value: rampTexture(SEA)},
         errors: {value: rampTexture(ERROR)},
