@@ -108,10 +108,11 @@ $(BUILD)/generated/schema_sql.h: sql/schema.sql sql/terrain.sql sql/fill.sql sql
 demo: all ## import a real DEM and show what rqt does with it; pictures in build/demo
 	@BUILD=$(BUILD) ./examples/demo.sh
 
+PORT ?= 8080
 .PHONY: serve-demo
-serve-demo: all ## the query service and its page on the demo's terrain, at http://127.0.0.1:8080/
+serve-demo: all ## the query service and its page on the demo's terrain, at http://127.0.0.1:8080/ (PORT=0: where it is free)
 	@[ -e $(BUILD)/demo/white-mountains.gpkg ] || $(MAKE) --no-print-directory demo
-	@$(BUILD)/rqt serve $(BUILD)/demo/white-mountains.gpkg
+	@$(BUILD)/rqt serve --port $(PORT) $(BUILD)/demo/white-mountains.gpkg
 
 # ------------------------------------------------------------------------------------------------------ tests
 # Everything that a test may want of us in one archive; the linker takes what each one needs.
@@ -188,15 +189,15 @@ test-threads: ## what runs on several threads, under ThreadSanitizer
 	@$(MAKE) --no-print-directory -j2 products
 	@$(MAKE) --no-print-directory -j2 BUILD=$(BUILD)/threads OPTIMIZE=-O1 WARNINGS=-w SANITIZE=-fsanitize=thread $(THREADED:%=$(BUILD)/threads/tests/%) $(BUILD)/threads/rqt
 	@BUILD=$(BUILD)/threads PROGRAMS="$(THREADED)" ./tests/run.sh programs
-	@TSAN_OPTIONS=suppressions=$(CURDIR)/tests/threads.supp RQT_HOSTILE_MIB=1024 RQT=$(CURDIR)/$(BUILD)/threads/rqt RQT_SO=$(CURDIR)/$(BUILD)/rqt.so ./tests/test_serve.sh | grep -v '^ok'
+	@TSAN_OPTIONS=suppressions=$(CURDIR)/tests/threads.supp RQT_HOSTILE_MIB=1024 RQT=$(CURDIR)/$(BUILD)/threads/rqt RQT_SO=$(CURDIR)/$(BUILD)/rqt.so ./tests/test_serve.sh quiet
 
 test-serve: ## the query service's tests, plain and under ASan and UBSan
 	@./src/install-packages.sh build test
 	@$(MAKE) --no-print-directory -j2 products
 	@$(MAKE) --no-print-directory -j2 BUILD=$(BUILD)/sanitized OPTIMIZE=-O1 \
 	  SANITIZE="-fsanitize=address,undefined -fno-sanitize-recover=undefined" $(BUILD)/sanitized/rqt
-	@RQT=$(CURDIR)/$(BUILD)/rqt RQT_SO=$(CURDIR)/$(BUILD)/rqt.so ./tests/test_serve.sh | grep -v '^ok'
-	@ASAN_OPTIONS=detect_leaks=1 LSAN_OPTIONS=suppressions=$(CURDIR)/tests/leaks.supp:print_suppressions=0 RQT_HOSTILE_MIB=1024 RQT=$(CURDIR)/$(BUILD)/sanitized/rqt RQT_SO=$(CURDIR)/$(BUILD)/rqt.so ./tests/test_serve.sh | grep -v '^ok'
+	@RQT=$(CURDIR)/$(BUILD)/rqt RQT_SO=$(CURDIR)/$(BUILD)/rqt.so ./tests/test_serve.sh quiet
+	@ASAN_OPTIONS=detect_leaks=1 LSAN_OPTIONS=suppressions=$(CURDIR)/tests/leaks.supp:print_suppressions=0 RQT_HOSTILE_MIB=1024 RQT=$(CURDIR)/$(BUILD)/sanitized/rqt RQT_SO=$(CURDIR)/$(BUILD)/rqt.so ./tests/test_serve.sh quiet
 
 test-web: ## the page in headless Chromium, and its modules in node; pictures in build/web-shots
 	@./src/install-packages.sh build test web browser

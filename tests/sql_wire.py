@@ -1,4 +1,4 @@
-"""A decoder of the wire format, written from src/core/FORMAT.md alone: rqt_mesh(..., 'rqt'), with normals or without, and rqt_delta."""
+"""A decoder of the wire format, written from src/core/FORMAT.md alone: rqt_mesh(..., 'rqt'), with normals and errors or without, and rqt_delta."""
 import ctypes
 import ctypes.util
 import struct
@@ -8,6 +8,8 @@ import sql_support as s
 ZSTD = ctypes.CDLL(ctypes.util.find_library("zstd") or "libzstd.so.1")
 ZSTD.ZSTD_decompress.restype = ctypes.c_size_t
 ZSTD.ZSTD_decompress.argtypes = (ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p, ctypes.c_size_t)
+ZSTD.ZSTD_getFrameContentSize.restype = ctypes.c_ulonglong
+ZSTD.ZSTD_getFrameContentSize.argtypes = (ctypes.c_void_p, ctypes.c_size_t)
 ZSTD.ZSTD_findFrameCompressedSize.restype = ctypes.c_size_t
 ZSTD.ZSTD_findFrameCompressedSize.argtypes = (ctypes.c_void_p, ctypes.c_size_t)
 NONE, ALL, PART, QUARTER = range(4)
@@ -18,7 +20,7 @@ class Wire:
 
     def __init__(self, data, before=None):
         magic, version, kind, self.k, flags = struct.unpack_from("<4s4B", data)
-        assert (magic, version, flags & ~1) == (b"RQTW", 1, 0) and kind == (2 if before else 1)
+        assert (magic, version) == (b"RQTW", 1) and flags < (1 if before else 4) and kind == (2 if before else 1)
         assert struct.unpack_from("<Q", data, 8)[0] == s.checksum(data, 8)
         self.counts = struct.unpack_from("<QQ", data, 16)
         self.identity = data[32:104] + data[112:120]
@@ -27,8 +29,12 @@ class Wire:
             assert self.identity == before.identity and self.eps_from == before.eps
         self.prior = dict(before.lattice) if before else {}
         self.before = {self.sample(v): q for v, q in self.prior.items()}
-        end = 144 + ZSTD.ZSTD_findFrameCompressedSize(data[144:], len(data) - 144)
-        self.streams(self.inflate(data[144:end], payload))
+        frames, end = [], 144
+        while end < len(data):
+            begin, end = end, end + ZSTD.ZSTD_findFrameCompressedSize(data[end:], len(data) - end)
+            frames.append(data[begin:end])
+        assert end == len(data) and len(frames) == 1 + (flags & 1) + (flags >> 1)
+        self.streams(self.inflate(frames[0], payload))
         self.K = 0
         while (1 << self.K) + 1 < max(self.width, self.height):
             self.K += 1
@@ -39,11 +45,14 @@ class Wire:
             used = self.at[i]
             assert used == len(p) if not bits else (used + 7) // 8 == len(p), ("stream", i, used, len(p))
         assert self.counts == (len(self.vertices), len(self.triangles))
-        assert flags or end == len(data)
-        self.normals = self.read_normals(self.inflate(data[end:], 2 * self.counts[0])) if flags else None
+        self.normals = self.read_normals(self.inflate(frames[1], 2 * self.counts[0])) if flags & 1 else None
+        self.errors = self.read_errors(self.inflate(frames[-1], None), data) if flags & 2 else None
 
     @staticmethod
     def inflate(frame, size):
+        """size None: as the frame says."""
+        if size is None:
+            size = ZSTD.ZSTD_getFrameContentSize(frame, len(frame))
         plain = ctypes.create_string_buffer(size)
         assert ZSTD.ZSTD_decompress(plain, size, frame, len(frame)) == size
         return plain.raw
@@ -61,6 +70,58 @@ class Wire:
             length = (x * x + y * y + z * z) ** 0.5
             found.append((x / length, y / length, z / length))
         return found
+
+    def read_errors(self, plain, data):
+        """Metres of every vertex, in their order."""
+        n, d, above, below = self.counts[0], *struct.unpack_from("<3i", data, 72)
+        f = struct.unpack_from("<d", data, 88)[0] * (above / below)
+        least, list_at = plain[0] + 256 * plain[1], 2 + (n + 7) // 8
+        bits = [plain[2 + i // 8] >> i % 8 & 1 for i in range(8 * (list_at - 2))]
+        m = sum(bits)
+        assert len(plain) == list_at + 2 * m and not any(bits[n:])
+        residuals = [plain[list_at + i] + 256 * plain[list_at + m + i] for i in range(m)]
+        assert 0 not in residuals
+
+        def kind(v):
+            s = 1
+            while s < 1 << self.K and v[0] % (2 * s) == v[1] % (2 * s) == 0:
+                s *= 2
+            return s, v[0] // s % 2 + 2 * (v[1] // s % 2)  # which of the two are odd
+
+        place = [v[:2] for v in self.vertices]
+        at = {v: i for i, v in enumerate(place)}
+        codes, children, told = [None] * n, [0] * n, iter(residuals)
+        order = sorted(range(n), key=lambda i: (kind(place[i])[0], kind(place[i])[1] == 3, i))
+        for bit, i in zip(bits, order):
+            x, y = place[i]
+            s, odd = kind(place[i])
+            across, along, main, other = (((x - a * s, y - b * s), (x + a * s, y + b * s)) for a, b in ((1, 0), (0, 1), (1, 1), (1, -1)))
+            ends, parents = (across, along) if odd == 1 else (along, across) if odd == 2 else (main, other) if (x + y) // (2 * s) % 2 else (other, main)
+            corner = {x, y} <= {0, 1 << self.K}
+            guess = max(least, children[i])
+            if not corner and ends[0] in at and ends[1] in at:
+                v = abs(2 * self.vertices[i][2] - sum(self.vertices[at[e]][2] for e in ends)) * abs(f) / (2 * d)
+                guess = max(guess, self.code_of(v))
+            codes[i] = (guess + (next(told) if bit else 0)) % 65536
+            for p in () if corner else parents:
+                if p in at:
+                    assert codes[at[p]] is None
+                    children[at[p]] = max(children[at[p]], codes[i])
+        self.least = self.metres_of(least)
+        return [self.metres_of(c) for c in codes]
+
+    @staticmethod
+    def code_of(v):
+        """The smallest that is not below v, by search."""
+        low, high = (0, 0) if v == 0 else (1, 65534)
+        while low < high:
+            middle = (low + high) // 2
+            low, high = (low, middle) if Wire.metres_of(middle) >= v else (middle + 1, high)
+        return low
+
+    @staticmethod
+    def metres_of(code):
+        return 0.0 if code == 0 else float("inf") if code == 65535 else (128 + (code & 127)) * 2.0 ** ((code >> 7) - 263)
 
     def streams(self, plain):
         first, number = plain[0], plain[1]

@@ -303,11 +303,6 @@ done
 rqt $M --eps 2 --normals -o n.ply
 sqlite3 t.gpkg -cmd ".load $RQT_SO" "SELECT writefile('sql.ply', rqt_mesh(NULL, 2, 'ply+normals', 'hill'))" >/dev/null 2>&1
 [ -s n.ply ] && cmp -s n.ply sql.ply && grep -aq 'property float nz' n.ply; ok "mesh --normals: SQL's bytes, with normals" $? "$(cat err)"
-for what in glb glb+normals glb+quantized glb+quantized+normals; do
-    rqt $M --eps 2 $(echo "${what#glb}" | sed 's/+/ --/g') -o n.glb
-    sqlite3 t.gpkg -cmd ".load $RQT_SO" "SELECT writefile('sql.glb', rqt_mesh(NULL, 2, '$what', 'hill'))" >/dev/null 2>&1
-    [ $status = 0 ] && [ -s n.glb ] && cmp -s n.glb sql.glb; ok "mesh -o .glb: SQL's bytes of $what" $? "$(cat err)"
-done
 if command -v gdal_translate >/dev/null; then
     gdal_translate -q -a_srs EPSG:32633 hill.asc utm.tif 2>/dev/null
     rqt import utm.tif utm.gpkg

@@ -112,7 +112,13 @@ static const char *const further_statements[] = {
     "SELECT rqt_mesh(rqt_bbox(-71.4, 44.2, -71.3, 44.3), 30, 'obj', NULL, '{\"frame\":\"ecef\"}')",
     "SELECT * FROM rqt_range(rqt_bbox(-71.4, 44.2, -71.3, 44.3), 30, NULL, '{\"frame\":\"enu\"}')",
     "SELECT rqt_mesh(rqt_bbox(-71.4, 44.2, -71.3, 44.3), 30, 'ply+normals')",
-    "SELECT rqt_mesh(rqt_bbox(-71.4, 44.2, -71.3, 44.3), 30, 'rqt+normals')",
+    "SELECT rqt_mesh(rqt_bbox(-71.4, 44.2, -71.3, 44.3), 30, 'rqt+normals+errors')",
+    "SELECT * FROM rqt_answer(NULL, 3, 'ply', NULL, '{\"max_vertices\":300}')",
+    "SELECT * FROM rqt_answer(NULL, 30, 'obj', NULL, '{\"mode\":\"cut\"}')",
+    "SELECT * FROM rqt_view_answer('{\"eye\":[-71.4,44.2,3000],\"yaw\":30,\"pitch\":-20,\"fovy\":60,\"width\":64,"
+    "\"height\":48,\"tau\":2}', 'increment', NULL, '{\"previous\":\"\",\"cover\":\"terrain\"}')",
+    "SELECT mesh, token FROM rqt_view_answer('{\"eye\":[-71.4,44.2,3000],\"yaw\":30,\"pitch\":-20,\"fovy\":60,"
+    "\"width\":64,\"height\":48,\"tau\":2}', 'rqt', NULL, '{\"previous\":\"\",\"max_triangles\":300}')",
 };
 
 static inline int statement_count(void) {

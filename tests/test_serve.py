@@ -31,7 +31,8 @@ ask = service.ask
 s.check("the service says where it listens, on this machine alone", re.fullmatch(r"http://127\.0\.0\.1:\d+/", service.url), service.url)
 
 # ------------------------------------------------------------------------------------------- meshes, byte for byte
-TYPES = {"rqt": "application/vnd.rqt.mesh", "rqt+normals": "application/vnd.rqt.mesh", "obj": "model/obj", "ply": "application/x-ply",
+TYPES = {"rqt": "application/vnd.rqt.mesh", "rqt+normals": "application/vnd.rqt.mesh", "rqt+errors": "application/vnd.rqt.mesh",
+         "rqt+normals+errors": "application/vnd.rqt.mesh", "obj": "model/obj", "ply": "application/x-ply",
          "ply+normals": "application/x-ply", "strip": "application/vnd.rqt.strip", "indexed": "application/vnd.rqt.indexed",
          "wkb": "application/vnd.rqt.wkb"}
 TYPES.update((name, "model/gltf-binary") for name in ("glb", "glb+normals", "glb+quantized", "glb+quantized+normals"))
@@ -42,6 +43,21 @@ def sql_bytes(sql, *arguments):
     return value.encode() if isinstance(value, str) else value
 
 
+TOLD = {"vertices": "rqt-vertices", "triangles": "rqt-triangles", "achieved_eps": "rqt-achieved-eps", "achieved_tau": "rqt-achieved-tau",
+        "guaranteed": "rqt-guaranteed", "token": "rqt-token"}
+
+
+def told(answer):
+    return {name: value for name, value in answer.headers.items() if name.startswith("rqt-")}
+
+
+def told_by(sql, *arguments):
+    """What a row says, as headers."""
+    cursor = db.execute(sql, arguments)
+    return {TOLD[column[0]]: "9e999" if value == float("inf") else re.sub(r"\.0$", "", repr(value)) if isinstance(value, float) else str(value)
+            for column, value in zip(cursor.description, cursor.fetchone()) if value is not None}
+
+
 for name, kind in sorted(TYPES.items()):
     for region, words in ((WKT, {"wkt": WKT}), (None, {"bbox": BOX})):
         sql = "SELECT rqt_mesh(%s, 10, ?2, 'hills', ?1)" % ("?3" if region else "rqt_bbox(%s)" % BOX)
@@ -49,9 +65,19 @@ for name, kind in sorted(TYPES.items()):
         answer = ask(HILLS + "/range", dict(words, eps=10, f=name))
         equal("range as %s by %s is rqt_mesh's bytes" % (name, list(words)[0]), (answer.status, answer.content_type, answer.body),
               (200, kind, expected))
-    answer = ask(HILLS + "/view", {"camera": CAMERA, "f": name})
-    equal("view as %s is rqt_view_mesh's bytes" % name, (answer.status, answer.content_type, answer.body),
-          (200, kind, sql_bytes("SELECT rqt_view_mesh(?1, ?2, 'hills')", CAMERA, name)))
+        equal("and its headers tell what rqt_answer does (%s by %s)" % (name, list(words)[0]), told(answer), told_by(
+            "SELECT vertices, triangles, achieved_eps FROM rqt_answer(%s, 10, ?1, 'hills')" % ("?2" if region else "rqt_bbox(%s)" % BOX),
+            name, *([region] if region else [])))
+    for cover in ({}, {"cover": "terrain"}):
+        answer = ask(HILLS + "/view", dict(cover, camera=CAMERA, f=name))
+        equal("view as %s %s is rqt_view_mesh's bytes" % (name, cover), (answer.status, answer.content_type, answer.body),
+              (200, kind, sql_bytes("SELECT rqt_view_mesh(?1, ?2, 'hills', ?3)", CAMERA, name, json.dumps(cover))))
+        equal("and its headers tell what rqt_view_answer does (%s %s)" % (name, cover), told(answer), told_by(
+            "SELECT vertices, triangles, achieved_tau, guaranteed, token FROM rqt_view_answer(?1, ?2, 'hills', ?3)", CAMERA, name, json.dumps(cover)))
+
+
+def one_row(sql, *arguments):
+    return s.one(db, sql, *arguments)
 
 
 def finite(rows):
@@ -68,6 +94,29 @@ equal("range of everything at the coarsest eps, infinite errors null", answer.js
 check("there are such errors", any(row[3] is None for row in answer.json()["rows"]))
 answer = ask(HILLS + "/view", {"camera": CAMERA})
 equal("view without f is JSON of rqt_view's rows", answer.json()["rows"], finite(s.rows(db, "SELECT * FROM rqt_view(?1, 'hills')", CAMERA)))
+for path, sql in ((HILLS + "/range?eps=30", "rqt_range(NULL, 30, 'hills')"), (HILLS + "/range?eps=9e999&f=geojson", "rqt_triangles(NULL, 9e999, 'hills')"),
+                  (HILLS + "/range?eps=0&max_vertices=3000", "rqt_range(NULL, 0, 'hills', '{\"max_vertices\":3000}')")):
+    equal("headers of rows (%s)" % path, told(ask(path)), told_by("SELECT vertices, triangles, achieved_eps FROM " + sql))
+for name in ("json", "geojson"):
+    equal("headers of a view's rows (%s)" % name, told(ask(HILLS + "/view", {"camera": CAMERA, "f": name, "previous": "", "max_triangles": 2000})), told_by(
+        "SELECT vertices, triangles, achieved_tau, guaranteed, token FROM rqt_view(?1, 'hills', '{\"previous\":\"\",\"max_triangles\":2000}')", CAMERA))
+    equal("of rows that are none (%s)" % name, told(ask(HILLS + "/range", {"wkt": "POINT(0 0)", "eps": 7, "f": name})),
+          {"rqt-vertices": "0", "rqt-triangles": "0", "rqt-achieved-eps": "7"})
+    equal("of a view that sees nothing (%s)" % name, told(ask(HILLS + "/view", {"camera": CAMERA.replace('"at": [-71.3033, 44.2705, 1500]', '"yaw": 0, "pitch": 89'), "f": name})),
+          {"rqt-vertices": "0", "rqt-triangles": "0", "rqt-achieved-tau": "3", "rqt-guaranteed": "1"})
+equal("JSON says the same", {TOLD[key]: str(value) for key, value in ask(HILLS + "/range?eps=30").json().items() if key in TOLD}, told(ask(HILLS + "/range?eps=30")))
+token, steps = "", []
+for step in range(3):
+    answer = ask(HILLS + "/view", {"camera": CAMERA, "f": "increment", "previous": token, "cover": "terrain"})
+    expected = one_row("SELECT mesh, token FROM rqt_view_answer(?1, 'increment', 'hills', ?2)", CAMERA, json.dumps({"previous": token, "cover": "terrain"}))
+    equal("increment %d: rqt_view_mesh's bytes, and the token in a header" % step, (answer.status, answer.content_type, answer.body, answer.rqt_token),
+          (200, "application/vnd.rqt.increment", *expected))
+    token = answer.rqt_token or ""
+    steps.append(len(answer.body))
+equal("which is packed already", ask(HILLS + "/view", {"camera": CAMERA, "f": "increment", "previous": ""}, headers={"Accept-Encoding": "gzip"}).content_encoding, None)
+equal("which are few where nothing changes", steps[1:], [48, 48])
+check("increments are of views", 'format "increment" is for views' in ask(HILLS + "/range?eps=1&f=increment").detail())
+answer = ask(HILLS + "/view", {"camera": CAMERA})
 equal("and says what is promised", (answer.json()["achieved_tau"], answer.json()["guaranteed"]),
       s.one(db, "SELECT achieved_tau, guaranteed FROM rqt_view(?1, 'hills') LIMIT 1", CAMERA))
 
@@ -168,6 +217,10 @@ equal("without a known CRS there is none", plain["extent"]["spatial"], {"bbox": 
 row = dict(zip(("width", "height", "min_z", "max_z", "blocks", "bytes"),
                s.one(db, "SELECT width, height, min_z, max_z, blocks, bytes FROM rqt_terrains WHERE name = 'hills'")))
 equal("it tells what rqt_terrains does", {key: hills["terrain"][key] for key in row}, row)
+space = dict(zip(("srid", "crs_name", "x0", "y0", "dx", "dy", "quantum_error", "lonlat", "semi_major", "inverse_flattening"), one_row(
+    "SELECT srid, crs_name, x0, y0, dx, dy, quantum_error, lonlat, semi_major, inverse_flattening FROM rqt_terrains WHERE name = 'hills'")))
+equal("and what makes places in space", {key: hills["terrain"].get(key) for key in space}, space)
+equal("of a plane terrain the metres of a unit", (plain["terrain"]["lonlat"], plain["terrain"]["metre"], "semi_major" in plain["terrain"]), (0, 1, False))
 check("and not where it came from on this machine", "source" not in hills["terrain"])
 
 # OpenAPI: what it describes is what there is.
@@ -191,6 +244,9 @@ for path, item in sorted(api["paths"].items()):
     equal("OpenAPI: %s answers its examples" % path, answer.status, 200)
     kinds = item["get"]["responses"]["200"]["content"]
     check("OpenAPI: %s answers in a described type" % path, any((answer.content_type or "").startswith(kind) for kind in kinds), answer.content_type)
+    described = {name.lower() for name in item["get"]["responses"]["200"].get("headers", {})} - {"etag"}
+    check("OpenAPI: %s describes the headers that tell of a mesh" % path, set(told(answer)) <= described and (path.endswith(("/range", "/view")) == bool(described)),
+          (told(answer), described))
     equal("OpenAPI: %s knows no other parameter" % path, ask(whole, dict(needed, another=1)).status, 400)
     for name in needed:
         left = {key: value for key, value in needed.items() if key != name}
@@ -244,6 +300,7 @@ for header in (first.etag, "W/" + first.etag, '"x", %s' % first.etag, "*", '"x" 
     answer = ask(HILLS + "/range", RANGE, headers={"If-None-Match": header})
     equal("If-None-Match %s" % header.replace(first.etag, "ETAG"), (answer.status, answer.body, answer.etag, answer.cache_control, answer.vary, answer.access_control_allow_origin),
           (304, b"", first.etag, "public, no-cache", "Accept-Encoding", "*"))
+    equal("which tells nothing of the mesh (%s)" % header.replace(first.etag, "ETAG"), told(answer), {})
 for header in ('"x"', first.etag[:-2] + '"', first.etag.strip('"'), '"' + first.etag, "W/", ","):
     equal("If-None-Match %s is another" % header.replace(first.etag, "ETAG"), ask(HILLS + "/range", RANGE, headers={"If-None-Match": header}).status, 200)
 tags = [first.etag, coding("gzip").etag, coding("zstd").etag, ask(HILLS + "/range", dict(RANGE, eps=21)).etag, ask(HILLS + "/range", dict(RANGE, f="ply")).etag,
@@ -258,10 +315,13 @@ for path in (HILLS, HILLS + "/range?eps=50&f=obj", "/", "/collections", "/openap
     whole_answer, head = ask(path), ask(path, method="HEAD")
     equal("HEAD %s" % path, (head.status, head.body, head.content_length, head.content_type, head.etag),
           (whole_answer.status, b"", whole_answer.content_length, whole_answer.content_type, whole_answer.etag))
+    equal("HEAD %s tells what GET does" % path, told(head), told(whole_answer))
 for path in (HILLS + "/range", "/", "*"):
     answer = ask(path, method="OPTIONS", headers={"Origin": "http://elsewhere.example", "Access-Control-Request-Method": "GET"})
     equal("OPTIONS %s" % path, (answer.status, answer.allow, answer.access_control_allow_methods, answer.access_control_allow_origin, answer.body),
           (204, "GET, HEAD, OPTIONS", "GET, HEAD, OPTIONS", "*", b""))
+exposed = {name.strip().lower() for name in (ask(HILLS + "/range?eps=400&f=rqt").access_control_expose_headers or "").split(",")}
+equal("pages from elsewhere may read the tag and what is told", exposed, {"etag", *TOLD.values()})
 for path in (HILLS, "/nothing", HILLS + "/range?eps=-1"):
     equal("CORS of %s" % path, ask(path, headers={"Origin": "http://elsewhere.example"}).access_control_allow_origin, "*")
 for method in ("POST", "PUT", "DELETE", "PATCH", "TRACE", "PROPFIND", "BREW"):
@@ -363,7 +423,7 @@ thread.start()
 wait_until(lambda: b"rqt_requests_working 1" in service.ask("/metrics").body)
 service.process.send_signal(signal.SIGINT)
 thread.join()
-equal("what is under way at SIGINT is answered", (slow["verify"].status, slow["verify"].json()["max_error"]), (200, 0))
+equal("what is under way at SIGINT is answered", (slow["verify"].status, slow["verify"].json().get("max_error")), (200, 0))
 equal("and its connection is told that it was the last", slow["verify"].connection, "close")
 equal("then it ends", service.stop()[0], 0)
 try:
@@ -561,7 +621,7 @@ busy = socket.socket()
 busy.bind(("127.0.0.1", 0))
 busy.listen()
 said, code = s.run([s.RQT, "serve", "--port", str(busy.getsockname()[1]), DB])
-check("a port that is taken", code == 1 and "Address already in use" in said, (code, said))
+check("a port that is taken", code == 1 and "Address already in use (--port 0 takes one that is free)" in said, (code, said))
 busy.close()
 service = Service("--bind", "::1", DB)
 check("IPv6", re.fullmatch(r"http://\[::1\]:\d+/", service.url), service.url)

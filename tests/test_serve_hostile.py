@@ -70,7 +70,7 @@ ENDPOINTS = {"range": ["bbox", "wkt", "eps", "f", "options", "mode", "outline", 
              "view": ["camera", "f", "options", "outline", "metric", "max_triangles", "previous", "test"], "delta": ["bbox", "wkt", "eps_from", "eps_to"], "height": ["x", "y", "eps"],
              "profile": ["line", "eps"], "verify": ["bbox", "wkt", "eps", "options", "mode"], "explain": ["bbox", "wkt", "eps", "options"], "area": ["bbox", "wkt", "eps", "mode", "frame"]}
 GOOD = {"eps": "5", "eps_from": "20", "eps_to": "5", "x": "-70.5", "y": "44.5", "line": SHAPES[1], "camera": CAMERAS[0], "bbox": "-70.9,44.2,-70.5,44.6", "f": "json"}
-FORMATS = ["json", "geojson", "rqt", "rqt+normals", "glb", "obj", "ply", "ply+normals", "strip", "indexed", "wkb", "svg", "exe", "../obj", "obj;ls"]
+FORMATS = ["json", "geojson", "rqt", "rqt+normals", "rqt+errors", "rqt+normals+errors", "glb", "glb+quantized+normals", "obj", "ply", "ply+normals", "strip", "indexed", "wkb", "svg", "exe", "../obj", "obj;ls"]
 
 
 def ammunition(name):

@@ -15,6 +15,8 @@ TABLES = {  # visible columns, then the arguments
     "rqt_range": ("x y z error level", MESH),
     "rqt_triangles": ("id x0 y0 z0 x1 y1 z1 x2 y2 z2", MESH),
     "rqt_strip": ("seq x y z", MESH),
+    "rqt_answer": ("mesh vertices triangles achieved_eps", ["region", "eps", "format", "terrain", "options"]),
+    "rqt_view_answer": ("mesh vertices triangles achieved_tau guaranteed token", ["camera", "format", "terrain", "options"]),
     "rqt_verify": ("samples vertices triangles max_error rms_error x y t_junctions overlaps uncovered area", MESH),
     "rqt_explain": ("level extent why bytes cached selected", MESH),
     "rqt_view": ("x y z error level", VIEW),

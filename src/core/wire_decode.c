@@ -248,7 +248,10 @@ static rqt_status decode(const rqt_wire_header *h, const uint8_t *bytes, size_t 
     wire_part parts[WIRE_PARTS];
     (void)wire_parts_find(bytes, size, parts); /* they are there: rqt_wire_info has looked */
     decoder *d = memory_take(allocator, sizeof *d);
-    if (!d) return RQT_NO_MEMORY;
+    if (!d) {
+        sentence_begin(message, "out of memory");
+        return RQT_NO_MEMORY;
+    }
     rqt_status status = wire_walk_create(&d->walk, &h->lattice, h->k, allocator);
     if (status == RQT_OK) status = run(d, h, &parts[WIRE_MESH], state, wants_leaves, message);
     if (status == RQT_OK) {

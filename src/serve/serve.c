@@ -35,7 +35,8 @@ static int wait_for_signal(const sigset_t *set, long milliseconds) {
 }
 
 static int fail(char *why, size_t size, int listening, struct addrinfo *found, const char *address, int port) {
-    snprintf(why, size, "%s port %d: %s", address, port, strerror(errno));
+    snprintf(why, size, "%s port %d: %s%s", address, port, strerror(errno),
+             errno == EADDRINUSE ? " (--port 0 takes one that is free)" : "");
     if (listening >= 0) close(listening);
     freeaddrinfo(found);
     return -1;

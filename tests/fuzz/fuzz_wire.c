@@ -1,5 +1,5 @@
-/* fuzz_wire.c - meshes as bytes, 'rqt' with normals or without, and increments, 'strip' and 'indexed': those of
- * queries come back as they were; damaged ones, signed again, inside and outside the compressed frame, and any
+/* fuzz_wire.c - meshes as bytes, 'rqt' with normals and errors or without, increments, 'strip' and 'indexed': those
+ * of queries come back as they were; damaged ones, signed again, inside and outside the compressed frame, and any
  * bytes, are refused or are meshes. */
 #include "fuzz_terrain.h"
 
@@ -173,6 +173,58 @@ static void add_normals(input *in, const wire *w, const rqt_allocator *a, fuzz_h
     free(with.bytes);
 }
 
+/* The mesh again, with the errors that it is said to have. */
+static void read_errors(const wire *with, const rqt_allocator *a, fuzz_heap *h) {
+    rqt_wire_header header;
+    rqt_patch patch = {0};
+    rqt_message why;
+    if (went_well(rqt_wire_decode(with->bytes, with->size, true, a, &header, &patch, &why), h)) {
+        HOLD(header.has_errors && patch.vertex_count == with->patch.vertex_count, "%zu vertices",
+             patch.vertex_count);
+        for (size_t i = 0; i < patch.vertex_count; i++)
+            HOLD(patch.vertices[i].error == with->patch.vertices[i].error, "vertex %zu: code %d, had %d", i,
+                 patch.vertices[i].error, with->patch.vertices[i].error);
+    }
+    rqt_patch_free(&patch);
+}
+
+/* Errors behind a mesh, some of them as no terrain has them; damaged, plain or compressed, they are refused or
+ * read. */
+static void add_errors(input *in, const wire *w, const rqt_allocator *a, fuzz_heap *h) {
+    const size_t n = w->patch.vertex_count, bound = w->size + rqt_wire_errors_bound(n);
+    wire with = {.patch = w->patch, .bytes = malloc(bound), .size = w->size};
+    with.patch.vertices = malloc(n * sizeof *with.patch.vertices + 1);
+    if (!with.bytes || !with.patch.vertices) abort();
+    memcpy(with.bytes, w->bytes, w->size);
+    memcpy(with.patch.vertices, w->patch.vertices, n * sizeof *with.patch.vertices);
+    for (int odd = take_between(in, 0, 9); odd > 0 && n > 0; odd--)
+        with.patch.vertices[take_bits(in, 2) % n].error = (rqt_code)take_bits(in, 2);
+    if (went_well(rqt_wire_add_errors(&with.patch, a, with.bytes, &with.size), h)) {
+        HOLD(with.size <= bound, "%zu bytes, bound %zu", with.size, bound);
+        HOLD(rqt_wire_add_errors(&with.patch, a, with.bytes, &with.size) == RQT_INVALID || h->refuse, "twice");
+        read_errors(&with, a, h);
+        uint8_t *const frame = with.bytes + w->size;
+        const size_t size = with.size - w->size, room = (size_t)ZSTD_getFrameContentSize(frame, size);
+        uint8_t *plain = malloc(room + 1);
+        if (!plain) abort();
+        if (take_between(in, 0, 1)) {
+            HOLD(ZSTD_decompress(plain, room, frame, size) == room, "no frame");
+            take_damage(in, plain, room);
+            const size_t again = ZSTD_compress(frame, bound - w->size, plain, room, 1);
+            if (!ZSTD_isError(again)) with.size = w->size + again;
+        } else {
+            take_damage(in, frame, size);
+            if (take_between(in, 0, 3) == 0) with.size -= (size_t)take_bits(in, 3) % (size + 1);
+        }
+        if (take_between(in, 0, 3) == 0) take_damage(in, with.bytes, RQT_WIRE_HEADER_BYTES);
+        fuzz_sign(with.bytes, with.size, 8);
+        decode(in, with.bytes, with.size, NULL, a, h);
+        free(plain);
+    }
+    free(with.patch.vertices);
+    free(with.bytes);
+}
+
 static void own_formats(input *in, const wire *w) {
     const rqt_mesh_header header = {.kind = RQT_MESH_INDEXED,
                                     .vertex_count = w->patch.vertex_count,
@@ -240,6 +292,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
                 rqt_patch_free(&patch);
                 own_formats(&in, &fine);
                 add_normals(&in, &coarse, &a, &heap);
+                add_errors(&in, &coarse, &a, &heap);
                 damage(&in, &coarse);
                 decode(&in, coarse.bytes, coarse.size, NULL, &a, &heap);
                 damage(&in, &fine);

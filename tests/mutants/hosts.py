@@ -24,6 +24,6 @@ MUTANTS = [
      "normals_come_back_beside_an_unchanged_mesh"),
     ("normals: a byte that is no step is taken", "src/core/wire_normals.c",
      "good &= packed[0] >= -STEPS && packed[1] >= -STEPS;", "", "test_wire_normals", "hostile_normals_are_refused_or_harmless"),
-    ("normals: bytes may follow them", "src/core/wire.c", "rest != normals ||", "rest < normals ||", "test_wire_normals",
+    ("normals: bytes may follow them", "src/core/wire.c", "return at == size;", "return at <= size;", "test_wire_normals",
      "normals_come_back_beside_an_unchanged_mesh"),
 ]

@@ -3,11 +3,12 @@ import {mkdirSync, writeFileSync} from 'node:fs';
 import {join} from 'node:path';
 import {ROOT, requirePackage} from './packages.mjs';
 import {decodePng, findGaps} from './picture.mjs';
+import {vanishingPoint} from './space.mjs';
 
 const {chromium} = requirePackage('playwright-core');
 const SHOTS = process.env.WEB_SHOTS || join(ROOT, 'build', 'web-shots');
 /** Milliseconds until a wait is given up: no measure of anything. */
-export const PATIENCE = 120000;
+export const PATIENCE = Number(process.env.WEB_PATIENCE || 60000);
 /** What the terrain never has: the background of the pictures in which gaps are looked for. */
 const BACKGROUND = [1, 0, 1];
 
@@ -25,13 +26,13 @@ export function launch() {
  *
  * `problems` collects what a clean page has none of: errors and warnings of the console, exceptions, requests that failed (but
  * for those that the page took back itself) and requests to anyone but the service. `record`: after every frame, the gaps in
- * it are looked for (frames()).
+ * it are looked for (frames()). `slow`: so many times slower does the time of the page go, so that what takes a moment has many frames.
  */
-export async function openPage(browser, service, {width, height, touch = false, path = '', record = false, prepare = async () => {}} = DESKTOP) {
+export async function openPage(browser, service, {width, height, touch = false, path = '', record = false, slow = 1, prepare = async () => {}} = DESKTOP) {
     const context = await browser.newContext({viewport: {width, height}, hasTouch: touch, isMobile: touch, deviceScaleFactor: 1});
     const page = await context.newPage();
     page.setDefaultTimeout(PATIENCE);
-    const problems = [];
+    const problems = [], asked = [];
     const origin = new URL(service.url).origin;
     page.on('console', message => {
         if (['error', 'warning', 'assert'].includes(message.type())) problems.push(`console: ${message.text()}`);
@@ -40,6 +41,7 @@ export async function openPage(browser, service, {width, height, touch = false, 
     page.on('request', request => {
         const url = new URL(request.url());
         if (!['blob:', 'data:'].includes(url.protocol) && url.origin !== origin) problems.push(`request to ${request.url()}`);
+        asked.push(url);
     });
     page.on('requestfailed', request => {
         const why = request.failure()?.errorText;
@@ -48,17 +50,18 @@ export async function openPage(browser, service, {width, height, touch = false, 
     page.on('response', response => {
         if (response.status() >= 400) problems.push(`${response.url()}: ${response.status()}`);
     });
-    if (record) await page.addInitScript(recordFrames, {detector: findGaps.toString(), background: BACKGROUND});
+    if (record) await page.addInitScript(recordFrames, {findGaps: findGaps.toString(), vanishingPoint: vanishingPoint.toString(), background: BACKGROUND, slow});
     await prepare(page);
     await page.goto(service.url + path);
-    await page.waitForFunction(() => window.rqtViewer?.ready);
-    return Object.assign(new View(), {page, context, problems});
+    await page.evaluate(() => window.rqtViewer.ready);
+    return Object.assign(new View(), {page, context, problems, asked});
 }
 
 export class View {
-    /** The page's own account of what it shows. */
-    state() {
-        return this.page.evaluate(() => window.rqtViewer.state());
+    /** The page's own account of what it shows: camera, terrain, settings and figures, in one. */
+    async state() {
+        const {settings, figures, ...state} = await this.page.evaluate(() => window.rqtViewer.state());
+        return {...settings, ...figures, ...state};
     }
 
     async setCamera(camera) {
@@ -89,9 +92,40 @@ export class View {
         await this.page.screenshot({path: join(SHOTS, `${name}.png`)});
     }
 
+    /** Keeps the first frames that had gaps, too. */
+    async keepGaps(name) {
+        const found = await this.page.evaluate(() => window.withGaps || []);
+        found.forEach((url, i) => writeFileSync(join(SHOTS, `${name}-gap${i}.png`), Buffer.from(url.split(',')[1], 'base64')));
+    }
+
     /** What recordFrames saw since the last call: [{count, at, terrain, ...}] with one entry a frame. */
     frames() {
         return this.page.evaluate(() => window.recordedFrames.splice(0));
+    }
+
+    /** The mesh that is shown, as the page's decoder made it: its arrays of numbers, and what stands in its header. */
+    async mesh() {
+        const found = await this.page.evaluate(() => {
+            const base64 = array => {
+                const bytes = new Uint8Array(array.buffer, array.byteOffset, array.byteLength);
+                let text = '';
+                for (let i = 0; i < bytes.length; i += 8192) text += String.fromCharCode(...bytes.subarray(i, i + 8192));
+                return {kind: array.constructor.name, base64: btoa(text)};
+            };
+            return Object.entries(window.rqtViewer.mesh()).map(([name, value]) => [name, ArrayBuffer.isView(value) ? base64(value) : value]);
+        });
+        const kinds = {Int8Array, Uint8Array, Int32Array, Uint32Array, Float32Array, Float64Array};
+        return Object.fromEntries(found.map(([name, value]) => {
+            if (!value?.base64) return [name, value];
+            const bytes = Uint8Array.from(Buffer.from(value.base64, 'base64'));
+            return [name, new kinds[value.kind](bytes.buffer)];
+        }));
+    }
+
+    /** What the page last asked for with this word in the path: {path, parameters}. */
+    lastAsked(word) {
+        const url = this.asked.filter(u => u.pathname.includes(word)).at(-1);
+        return url && {path: url.pathname + url.search, parameters: Object.fromEntries(url.searchParams)};
     }
 
     async close() {
@@ -105,47 +139,57 @@ export function keepingShots(name, views, body) {
         try {
             await body(t);
         } catch (error) {
-            for (const [i, view] of views().entries()) await view.shot(`FAILED ${name} ${i}`.replace(/[^\w.-]+/g, '_')).catch(() => {});
+            const file = `FAILED-${name}`.replace(/[^\w.-]+/g, '-');
+            for (const view of views()) await view.shot(file).then(() => view.keepGaps(file)).catch(() => {});
             throw error;
         }
     };
 }
 
-export function keepText(name, text) {
-    mkdirSync(SHOTS, {recursive: true});
-    writeFileSync(join(SHOTS, name), text);
-}
-
 /**
  * In the page, before its own scripts: paints the background in a colour of its own and reads the canvas after each frame,
  * within the same task, as it will be shown. A pixel with a share of that colour counts as background: edges are smoothed.
+ *
+ * window.leaveOut = n leaves the n-th triangle out of what is drawn.
  */
-function recordFrames({detector, background}) {
-    const findGaps = (0, eval)(`(${detector})`);
-    const clearColor = WebGL2RenderingContext.prototype.clearColor;
-    WebGL2RenderingContext.prototype.clearColor = function () { clearColor.call(this, ...background, 1); };
+function recordFrames({findGaps, vanishingPoint, background, slow}) {
+    const make = text => new Function(`return (${text})`)();
+    const gapsOf = make(findGaps), vanishing = make(vanishingPoint), gl = WebGL2RenderingContext.prototype;
+    const {clearColor, drawElements} = gl, copy = document.createElement('canvas');
+    const request = window.requestAnimationFrame.bind(window), now = performance.now.bind(performance);
+    let drawn = null;
     window.recordedFrames = [];
-    const copy = document.createElement('canvas');
-    const request = window.requestAnimationFrame.bind(window);
-    let drawn = false;
-    for (const name of ['drawElements', 'drawArrays', 'clear']) {
-        const draw = WebGL2RenderingContext.prototype[name];
-        WebGL2RenderingContext.prototype[name] = function (...rest) { drawn = this.canvas; return draw.apply(this, rest); };
-    }
+    window.withGaps = [];
+    window.pictures = [];
+    performance.now = () => now() / slow;
+    gl.clearColor = function () {
+        clearColor.call(this, ...background, 1);
+    };
+    gl.drawElements = function (mode, count, type, offset) {
+        drawn = this.canvas;
+        if (mode !== this.TRIANGLES || !(window.leaveOut < count / 3)) return drawElements.call(this, mode, count, type, offset);
+        const before = 3 * window.leaveOut, size = type === this.UNSIGNED_INT ? 4 : 2;
+        if (before) drawElements.call(this, mode, before, type, offset);
+        if (before + 3 < count) drawElements.call(this, mode, count - before - 3, type, offset + (before + 3) * size);
+    };
     const look = () => {
         if (!drawn) return;
-        const {width, height} = copy;
-        if (width !== drawn.width || height !== drawn.height) Object.assign(copy, {width: drawn.width, height: drawn.height});
+        const {width, height} = drawn;
+        if (width !== copy.width || height !== copy.height) Object.assign(copy, {width, height});
         const context = copy.getContext('2d', {willReadFrequently: true});
         context.drawImage(drawn, 0, 0);
-        drawn = false;
-        const {data} = context.getImageData(0, 0, copy.width, copy.height);
-        const shows = new Uint8Array(copy.width * copy.height);
+        drawn = null;
+        const {data} = context.getImageData(0, 0, width, height), shows = new Uint8Array(width * height);
         for (let i = 0; i < shows.length; i++) shows[i] = Math.min(data[4 * i], data[4 * i + 2]) - data[4 * i + 1] > 24 ? 1 : 0;
-        const vanishing = window.vanishingPoint?.(copy.width, copy.height) ?? null;
-        const found = findGaps(shows, copy.width, copy.height, vanishing);
-        window.recordedFrames.push({...found, width: copy.width, height: copy.height});
-        window.lastFrame = {shows, data, width: copy.width, height: copy.height};
+        const camera = window.rqtViewer.state?.().camera;
+        if (!camera) return;
+        const found = gapsOf(shows, width, height, vanishing({...camera, width, height}));
+        window.recordedFrames.push({...found, camera});
+        if (found.count && window.withGaps.length < 3) window.withGaps.push(copy.toDataURL());
+        if (window.keepPictures) window.pictures.push(new Uint32Array(data.buffer));
     };
-    window.requestAnimationFrame = callback => request(time => { callback(time); look(); });
+    window.requestAnimationFrame = callback => request(() => {
+        callback(performance.now());
+        look();
+    });
 }

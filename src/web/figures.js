@@ -1,0 +1,71 @@
+// figures.js - what is told of the mesh in the picture: how many triangles, what they cost, and what is proved of them.
+
+import {bytes, count, metres, milliseconds, pixels, plain} from './format.js';
+
+const element = id => document.getElementById(id);
+
+/** Triangles of the mesh with all samples. */
+const allTriangles = ({width, height}) => 2 * (width - 1) * (height - 1);
+
+function share(shown, all) {
+    const percent = 100 * shown / all;
+    return `${percent < 0.01 ? 'under 0.01' : plain(percent)} % of the full resolution's ${count(all)}`;
+}
+
+/** What the service proves of an answer, as a sentence; and does it prove anything? */
+export function promiseOf({wish, told}) {
+    const isRange = wish.ask === 'range', unit = isRange ? metres : pixels;
+    const reached = isRange ? told.achievedEps : told.achievedTau, tolerance = Number.isFinite(reached) ? reached : wish.asked;
+    const coarser = tolerance > wish.asked * 1.001 ? ` ${unit(wish.asked)} would take too many triangles.` : '';
+    if (isRange) {
+        const text = tolerance > 0 ? `nowhere more than ${unit(tolerance)} from any sample` : 'every sample is met exactly';
+        return {isProved: true, short: unit(tolerance), text: `Proved: ${text}.${coarser}`};
+    }
+    if (told.guaranteed === 0)
+        return {isProved: false, short: `about ${unit(tolerance)}`, text: `About ${unit(tolerance)} on screen, not proved.${coarser}`};
+    const text = `Proved: no sample in the picture is off by more than ${unit(tolerance)}.${coarser}`;
+    return {isProved: true, short: unit(tolerance), text};
+}
+
+export class Figures {
+    constructor() {
+        this.values = new Map();
+        for (const name of ['Vertices', 'Received', 'Answer', 'Decoding', 'Frame', 'Above ground', 'Eye']) {
+            const term = document.createElement('dt'), value = document.createElement('dd');
+            term.textContent = name;
+            value.textContent = '\u2013';
+            element('figures').append(term, value);
+            this.values.set(name, value);
+        }
+    }
+
+    set(name, text) {
+        const value = this.values.get(name);
+        if (value.textContent !== text) value.textContent = text;
+    }
+
+    /** @param stage of stream.js @param terrain as service.js has it */
+    showStage(stage, terrain) {
+        const {vertexCount, triangleCount} = stage.mesh, promise = promiseOf(stage);
+        element('triangles').textContent = count(triangleCount);
+        element('share').textContent = share(triangleCount, allTriangles(terrain.terrain));
+        element('promise').textContent = promise.text;
+        element('promise').classList.toggle('unproved', !promise.isProved);
+        element('summary').textContent = `${count(triangleCount)} triangles, ${promise.short}`;
+        this.set('Vertices', count(vertexCount));
+        this.set('Received', `${bytes(stage.bytes)}, ${bytes(Number(plain(stage.bytes / Math.max(1, vertexCount))))} a vertex`);
+        this.set('Answer', milliseconds(stage.milliseconds.answer));
+        this.set('Decoding', milliseconds(stage.milliseconds.decode));
+    }
+
+    /** @param rate frames a second, or 0 when nothing moves @param cost milliseconds of a frame */
+    showFrame(rate, cost) {
+        const text = rate ? `${plain(rate)} a second` : 'at rest';
+        this.set('Frame', cost ? `${milliseconds(cost)}, ${text}` : text);
+    }
+
+    showEye(clearance, place) {
+        this.set('Above ground', Number.isNaN(clearance) ? '\u2013' : metres(clearance));
+        this.set('Eye', place);
+    }
+}

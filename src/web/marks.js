@@ -1,0 +1,84 @@
+// marks.js - what is marked on the terrain: pins with their heights, and the line of a profile.
+
+import {Line2} from 'three/addons/lines/Line2.js';
+import {LineGeometry} from 'three/addons/lines/LineGeometry.js';
+import {LineMaterial} from 'three/addons/lines/LineMaterial.js';
+import {subtract} from './scene.js';
+
+const NAMESPACE = 'http://www.w3.org/2000/svg';
+const STEM = 22; // CSS pixels from the place to its label
+
+function pinNode(label) {
+    const node = document.createElementNS(NAMESPACE, 'g');
+    if (label) {
+        const stem = document.createElementNS(NAMESPACE, 'line'), text = document.createElementNS(NAMESPACE, 'text');
+        stem.setAttribute('y2', -STEM);
+        text.setAttribute('y', -STEM - 5);
+        text.textContent = label;
+        node.append(stem, text);
+    }
+    const dot = document.createElementNS(NAMESPACE, 'circle');
+    dot.setAttribute('r', 5);
+    node.append(dot);
+    return node;
+}
+
+export class Marks {
+    /** @param overlay the SVG over the picture @param scene of three.js */
+    constructor(overlay, scene) {
+        Object.assign(this, {overlay, pins: new Map(), lines: []});
+        // Twice: where the mesh hides it, faintly.
+        for (const [opacity, depthTest] of [[0.3, false], [1, true]]) {
+            const line = new Line2(new LineGeometry(), new LineMaterial({linewidth: 3, transparent: true, opacity, depthTest}));
+            line.frustumCulled = false;
+            line.visible = false;
+            line.renderOrder = 2;
+            scene.add(line);
+            this.lines.push(line);
+        }
+        this.restyle();
+    }
+
+    /** Takes the accent colour of the page, which may have gone from light to dark. */
+    restyle() {
+        const accent = getComputedStyle(document.documentElement).getPropertyValue('--accent').trim();
+        for (const {material} of this.lines) material.color.set(accent);
+    }
+
+    /** Puts the pin of a name at a point of the scene; a null point takes it away. */
+    pin(name, point, label = '') {
+        this.pins.get(name)?.node.remove();
+        this.pins.delete(name);
+        if (!point) return;
+        const node = pinNode(label);
+        this.overlay.append(node);
+        this.pins.set(name, {point, node});
+    }
+
+    /** @param points of the scene, in runs: a void interrupts the line; none: no line */
+    line(points) {
+        const [origin] = points, positions = points.flatMap(point => subtract(point, origin));
+        for (const line of this.lines) {
+            line.visible = points.length > 1;
+            if (!line.visible) continue;
+            line.geometry.dispose();
+            line.geometry = new LineGeometry();
+            line.geometry.setPositions(positions);
+            line.position.set(...origin);
+        }
+    }
+
+    clear() {
+        for (const name of [...this.pins.keys()]) this.pin(name, null);
+        this.line([]);
+    }
+
+    /** Puts everything where the camera sees it. */
+    place(camera, width, height) {
+        for (const {point, node} of this.pins.values()) {
+            const at = camera.project(point);
+            node.style.display = at ? '' : 'none';
+            if (at) node.setAttribute('transform', `translate(${(at.x + 1) / 2 * width} ${(1 - at.y) / 2 * height})`);
+        }
+    }
+}

@@ -1,0 +1,38 @@
+"""Mutants of what views cover, and of what is told of a mesh beside its bytes: see ../mutants.py."""
+
+COVER, ANSWER, SERVE = "test_sql_cover.py", "test_sql_answer.py", "test_serve.py"
+
+MUTANTS = [
+    ("cover: the terrain is the picture", "ext/view_field.c", "r->cover == VIEW_TERRAIN", "r->cover > VIEW_TERRAIN", COVER, "its area is the terrain's"),
+    ("cover: the picture is the terrain", "ext/view_field.c", "r->cover == VIEW_TERRAIN", "r->cover <= VIEW_TERRAIN", COVER, "who looks away"),
+    ("cover: what is not seen is as fine", "ext/view_field.c", "*eps = bound.eps / v->scene.exaggeration;", "*eps = shown ? bound.eps / v->scene.exaggeration : 1;", COVER,
+     "who looks away"),
+    ("cover: what is not seen may be anything", "ext/view_field.c", "*eps = bound.eps / v->scene.exaggeration;", "*eps = shown ? bound.eps / v->scene.exaggeration : INFINITY;",
+     COVER, "proved"),
+    ("cover: a token does not know it", "ext/token.c", "fold(fold(h, (uint64_t)r->max_triangles), r->cover)", "fold(h, (uint64_t)r->max_triangles)", COVER,
+     "a token is one of what is covered"),
+    ("cover: of regions, too", "ext/request.c", ': r->has_cover         ? "cover"\n', "\n", COVER, "cover is for views"),
+    ("answer: places that became one are counted twice", "ext/scalar.c", "    told->vertices = patch.vertex_count; /* in a frame some have become one */\n", "", ANSWER,
+     "and what they are the mesh of"),
+    ("answer: rows count places that became one", "ext/mesh_tables.c", "m->told.vertices = m->is_cut ? m->cut.vertex_count : m->patch.vertex_count;", "", ANSWER,
+     "tells in each row"),
+    ("answer: triangles that vanish at a pole are in the strip's number", "ext/frame.c", "triangles += c[0] != c[1] && c[1] != c[2] && c[2] != c[0];", "triangles++; (void)c;", ANSWER,
+     "rqt_strip tells in each row"),
+    ("answer: triangles that vanish at a pole are in the vertices' number", "ext/mesh_tables.c",
+     "if (r.frame && product == RQT_PRODUCT_VERTICES) product = RQT_PRODUCT_TRIANGLES;", "", ANSWER, "rqt_range tells in each row"),
+    ("answer: a cut tells nothing", "ext/scalar.c", "    told->triangles = cut.triangle_count;\n", "", ANSWER, "and what they are the mesh of"),
+    ("answer: what is unchanged has no triangles", "ext/follow.c", "            told->triangles = header.triangle_count;\n", "", ANSWER, "vertices and triangles of the whole"),
+    ("answer: the tolerance that was asked for", "ext/answer_tables.c", "v ? v->achieved_tau : r->achieved_eps", "v ? v->words.tau : r->achieved_eps", COVER, "a budget is one for all"),
+    ("answer: the eps that was asked for", "ext/answer_tables.c", "v ? v->achieved_tau : r->achieved_eps", "v ? v->achieved_tau : r->eps", ANSWER, "a budget achieves more"),
+    ("answer: no token", "ext/answer_tables.c", "return v ? view_token_of(", "return v && !r->previous ? view_token_of(", ANSWER, "has a token"),
+    ("answer: everything is guaranteed", "ext/answer_tables.c", ".guaranteed = v && v->guaranteed", ".guaranteed = v != NULL", COVER, "what a test of the literature promises"),
+    ("answer: obj is a BLOB", "ext/answer_tables.c", "else if (mesh->is_text)", "else if (0)", ANSWER, "obj: one row, with rqt_mesh's bytes"),
+    ("answer: a unit of feet is a metre", "ext/insight_tables.c", "sqlite3_result_double(result, terrain_metre(t));", "sqlite3_result_double(result, 1);", ANSWER, "lonlat, metre"),
+    ("answer: all degrees are those of WGS 84", "ext/insight_tables.c", "(t->wgs84 || geo_ellipsoid_of_wkt(t->crs, &earth))", "t->lonlat", ANSWER, "lonlat, metre"),
+    ("serve: nothing is told in headers", "src/serve/http.c", "if (*a->told[i]) put(", "if (0) put(", SERVE, "its headers tell"),
+    ("serve: an infinite eps is null", "src/serve/answer.c", 'buffer_text(&text, "9e999");', 'buffer_text(&text, "null");', SERVE, "headers of rows"),
+    ("serve: a mesh of no rows tells nothing", "src/serve/meshes.c", "code = tell_of_nothing(r, t, kind, *q);", "(void)tell_of_nothing;", SERVE, "of rows that are none"),
+    ("serve: pages from elsewhere may not read the token", "src/serve/http.c", "RQT-Guaranteed, RQT-Token", "RQT-Guaranteed", SERVE, "pages from elsewhere"),
+    ("serve: an increment is compressed twice", "src/serve/meshes.c", '"application/vnd.rqt.increment", SHAPE_BYTES, true', '"application/vnd.rqt.increment", SHAPE_BYTES, false', SERVE,
+     "which is packed already"),
+]

@@ -1,0 +1,107 @@
+// viewer_faults.test.mjs - what the page does when the service says no, says nonsense, or is gone.
+import assert from 'node:assert/strict';
+import {after, before, test} from 'node:test';
+import {DESKTOP, keepingShots, launch, openPage} from './browser.mjs';
+import {Service, TERRAINS} from './serve.mjs';
+
+let browser;
+const views = [];
+before(async () => { browser = await launch(); });
+after(() => browser.close());
+
+async function open(service, options = {}) {
+    const view = await openPage(browser, service, {...DESKTOP, path: '#terrain=metres', ...options});
+    views.splice(0, Infinity, view);
+    await view.settled();
+    return view;
+}
+
+/** The sentence that people see, or ''. */
+const sentence = view => view.page.evaluate(() => {
+    const problem = document.querySelector('#problem');
+    return problem.checkVisibility() ? problem.querySelector('p').textContent : '';
+});
+const until = (view, is) => view.page.waitForFunction(`(${is})(document.querySelector('#problem').checkVisibility())`);
+/** A camera a little further on each time. */
+const camera = async (view, n) => {
+    const {camera: {eye, yaw, pitch}} = await view.state();
+    return {eye, yaw: yaw + n, pitch, position: 'crs'};
+};
+
+test('the service is gone: a sentence; it is back: the page goes on', keepingShots('gone', () => views, async () => {
+    let service = await Service.start();
+    const view = await open(service), {port} = service;
+    await service.stop();
+    const lost = await camera(view, 20);
+    await view.setCamera(lost);
+    await until(view, shown => shown);
+    assert.match(await sentence(view), /does not answer/);
+    await view.shot('service-gone');
+    service = await Service.start({port});
+    await until(view, shown => !shown);
+    await view.settled();
+    const asked = JSON.parse(view.lastAsked('/view').parameters.camera), {camera: shown} = await view.state();
+    assert.deepEqual(asked, shown);
+    assert.ok(Math.abs(shown.yaw - lost.yaw % 360) < 1e-3);
+    assert.deepEqual(view.problems.filter(p => !/ERR_CONNECTION_REFUSED|ERR_EMPTY_RESPONSE|ERR_CONNECTION_RESET|ERR_SOCKET_NOT_CONNECTED/.test(p)), []);
+    await view.close();
+    await service.stop();
+}));
+
+test('more than the service gives: its sentence is shown, and a coarser mesh comes', keepingShots('413', () => views, async () => {
+    const service = await Service.start({options: ['--max-triangles', '3000']});
+    const view = await open(service, {path: '#terrain=metres&ask=range&eps=0'});
+    await until(view, shown => shown);
+    assert.match(await sentence(view), /3000/);
+    await view.shot('service-says-no');
+    await view.page.focus('#eps');
+    await view.page.keyboard.press('End');
+    await until(view, shown => !shown);
+    await view.settled();
+    const {triangles} = await view.state();
+    assert.ok(triangles > 0 && triangles <= 3000, `${triangles}`);
+    await view.close();
+    await service.stop();
+}));
+
+test('damaged answers: a sentence, the mesh before stays, and the page goes on', keepingShots('damaged', () => views, async () => {
+    const service = await Service.start();
+    let damage = null;
+    const prepare = page => page.route('**/view?*', async route => {
+        if (!damage) return route.continue();
+        const response = await route.fetch();
+        return route.fulfill({response, body: damage(Buffer.from(await response.body()))});
+    });
+    const view = await open(service, {prepare}), {triangles} = await view.state();
+    const turn = await camera(view, 15);
+    for (const [name, how] of Object.entries({
+        'cut off': bytes => bytes.subarray(0, bytes.length / 2),
+        'one bit': bytes => { bytes[bytes.length >> 1] ^= 4; return bytes; },
+        'empty': () => Buffer.alloc(0),
+        'noise': bytes => Buffer.from(bytes.map((b, i) => b ^ (i * 37))),
+        'a page': () => Buffer.from('<!doctype html><title>captive portal</title>'),
+    })) {
+        damage = how;
+        await view.setCamera({...turn, yaw: turn.yaw + name.length});
+        await until(view, shown => shown);
+        assert.ok((await sentence(view)).length > 10, name);
+        assert.equal((await view.state()).triangles, triangles, name);
+        damage = null;
+        await view.setCamera({...turn, yaw: turn.yaw - name.length});
+        await until(view, shown => !shown);
+        await view.see(await camera(view, 0));
+        await view.see({...turn, yaw: turn.yaw - 15});
+        assert.equal((await view.state()).triangles, triangles, `${name}: the view before`);
+    }
+    assert.deepEqual(view.problems.filter(p => !/ERR_|Failed to load/.test(p)), []);
+    await view.close();
+    await service.stop();
+}));
+
+test('a service without terrains, and a terrain that is not there: a sentence', keepingShots('nothing', () => views, async () => {
+    const service = await Service.start();
+    const view = await open(service, {path: '#terrain=atlantis'});
+    assert.ok(Object.keys(TERRAINS).includes((await view.state()).terrain), 'another terrain is shown instead');
+    await view.close();
+    await service.stop();
+}));
