@@ -3,8 +3,8 @@
  * A linear quadtree (Gargantini, "An effective way to represent quadtrees", 1982): along the Morton curve a square
  * is an interval, and squares that do not overlap are intervals one after the other. A square is one number, the
  * code of its north-west corner with the logarithm of its side below it; all of them, in order, are an array, and
- * those in any larger square are a part of it that two binary searches find. There is no tree to be built, and no
- * border: no edge has to be asked.
+ * those in any larger square are a part of it, the begin of which a binary search finds. There is no tree to be
+ * built, and no border: no edge has to be asked.
  *
  * Four brothers become their parent as they come, so a square is covered iff one of the array holds it: what has
  * been found to be neither that nor empty is across. A box is asked by the smallest square that holds it, and cut
@@ -84,14 +84,14 @@ static const uint64_t *first_not_before(run r, uint64_t code) {
     return r.begin;
 }
 
-/* How a cell lies to those of a run, which has all that overlap it; then the run has none but those. */
+/* How a cell lies to those of a run, which has all that overlap it; the run then begins with the first of them. */
 static rqt_relation relation_of(const cell *c, run *r) {
     const uint64_t end = c->first + area_of(c->log);
     const uint64_t *const at = first_not_before(*r, c->first);
     if (at > r->begin && end_of(at[-1]) > c->first) return RQT_INSIDE;
     if (at == r->end || first_of(*at) >= end) return RQT_OUTSIDE;
     if (first_of(*at) == c->first && end_of(*at) >= end) return RQT_INSIDE;
-    *r = (run){at, first_not_before((run){at, r->end}, end)};
+    r->begin = at;
     return RQT_ACROSS;
 }
 

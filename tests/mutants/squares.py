@@ -34,7 +34,7 @@ MUTANTS = [
     ("squares: touching is overlapping", REGION, "clamp_sample(-floor_sample(-box->x0) - 1, end)", "clamp_sample(-floor_sample(-box->x0), end)",
      "test_core_squares", TOUCH),
     ("squares: mode cut takes them", "src/core/cut.c", "    if (!region_has_border(region)) return RQT_INVALID;\n", "", "test_core_squares", "mode_cut_refuses_squares"),
-    ("squares: a middle of a side among leaves has one quarter's codes", "src/core/rule_choose.c", "{{lesser(two[0], two[1]), ", "{{two[0], ",
+    ("squares: a middle of a side among leaves has one quarter's codes", "src/core/rule_choose.c", "{lesser(two[0], two[1]), ", "{two[0], ",
      "test_core_field", CHOSEN),
     ("squares: around a quarter among leaves the same column is there twice", "src/core/rule_choose.c", "const int x = i & 1 ? 0 : 1,", "const int x = i & 1 ? 1 : 0,",
      "test_core_field", CHOSEN),
