@@ -47,7 +47,7 @@ export function morphMeshes(a, b) {
             throw new Error(`the meshes are not of one terrain: their ${name} is ${a[name]} and ${b[name]}`);
     const width = a.width ?? b.width ?? extentOf(a.col, b.col), height = a.height ?? b.height ?? extentOf(a.row, b.row);
     const longest = Math.max(width, height), K = longest > 2 ? 32 - Math.clz32(longest - 2) : 0;
-    const union = new Union(K, width, height);
+    const union = new Union(K, width, height, a.vertexCount + b.vertexCount);
     if (union.isClamped && !(a.leaves && b.leaves)) return unmoved(b);
     union.addMesh(A, a);
     union.addMesh(B, b);
@@ -68,13 +68,13 @@ function unmoved(b) {
 }
 
 class Union {
-    constructor(K, width, height) {
+    constructor(K, width, height, room) {
         Object.assign(this, {K, side: 2 ** K, width, height});
         this.isClamped = width - 1 < this.side || height - 1 < this.side;
         // Lattice vertices of both sets, by number.
-        this.table = new SampleTable();
+        this.table = new SampleTable(room + 1024);
         this.count = 0;
-        this.grow(1024);
+        this.grow(room + 1024);
         this.rim = [new SampleTable(), new SampleTable()]; // of clamped rasters: vertices of both in the last column and row
         this.kept = [null, null]; // of those that leave something out: leavesByApex
         this.heights = [null, null];
@@ -122,23 +122,28 @@ class Union {
             this.number[m][v] = i;
             this.z[m][v] = mesh.q[i];
         };
-        if (this.isClamped) {
-            for (let i = 0; i < mesh.vertexCount; i++)
-                if (mesh.col[i] === this.width - 1 || mesh.row[i] === this.height - 1) this.rim[m].add(mesh.col[i], mesh.row[i], mesh.q[i], i);
-            const {leaves, triangles, col, row} = mesh;
-            for (let t = 0; t < mesh.triangleCount; t++)
-                for (let c = 0; c < 3; c++) {
-                    const x = leaves[6 * t + 2 * c], y = leaves[6 * t + 2 * c + 1];
-                    const sampleX = Math.min(x, this.width - 1), sampleY = Math.min(y, this.height - 1);
-                    let i = 0;
-                    while (i < 2 && (col[triangles[3 * t + i]] !== sampleX || row[triangles[3 * t + i]] !== sampleY)) i++;
-                    add(x, y, triangles[3 * t + i]);
-                }
-        } else for (let i = 0; i < mesh.vertexCount; i++) add(mesh.col[i], mesh.row[i], i);
+        for (let i = 0; i < mesh.vertexCount; i++)
+            if (this.isRim(mesh.col[i], mesh.row[i])) this.rim[m].add(mesh.col[i], mesh.row[i], mesh.q[i], i);
+            else add(mesh.col[i], mesh.row[i], i);
+        if (this.isClamped) { // which lattice vertices those on the rim are
+            const {leaves} = mesh;
+            for (let at = 0; at < 6 * mesh.triangleCount; at += 2) {
+                const x = leaves[at], y = leaves[at + 1];
+                if (!this.isRim(x, y)) continue;
+                const e = this.rim[m].find(Math.min(x, this.width - 1), Math.min(y, this.height - 1));
+                if (e >= 0) add(x, y, this.rim[m].index[e]);
+            }
+        }
         this.heights[m] = mesh.q;
         const isWhole = this.isWhole(mesh);
         if (!isWhole) this.kept[m] = leavesByApex(mesh);
-        if (!isWhole || this.isClamped) this.closeSet(m);
+        // Of a whole mesh only what lies past the raster may be missing.
+        if (!isWhole || this.isClamped) this.closeSet(m, (v) => !isWhole || this.isNearEnd(this.x[v], this.y[v]));
+    }
+
+    /** Is a vertex in the last column or row of a clamped raster, or past them? */
+    isRim(x, y) {
+        return this.isClamped && (x >= this.width - 1 || y >= this.height - 1);
     }
 
     /** Do its triangles cover the whole raster? */
@@ -151,10 +156,10 @@ class Union {
         return twice === 2 * (this.width - 1) * (this.height - 1);
     }
 
-    /** All that the vertices of a set depend on is in it, too. */
-    closeSet(m) {
+    /** All that the vertices of a set depend on is in it, too; those asked about come first. */
+    closeSet(m, isAsked) {
         const bit = 1 << m, waiting = [];
-        for (let v = 0; v < this.count; v++) if (this.sets[v] & bit) waiting.push(v);
+        for (let v = 0; v < this.count; v++) if (this.sets[v] & bit && isAsked(v)) waiting.push(v);
         const ask = (x, y) => {
             if (x < 0 || y < 0 || x > this.side || y > this.side) return;
             const v = this.enter(x, y);
@@ -271,24 +276,28 @@ class Union {
     /** Lattice vertices that are one sample are one vertex. */
     meshOf(a, b) {
         const {triangleCount} = this, triangles = new Uint32Array(3 * triangleCount);
-        const index = new Int32Array(this.count).fill(-1), samples = this.isClamped ? new SampleTable() : null, chosen = [];
+        const index = new Int32Array(this.count).fill(-1), samples = new SampleTable(), chosen = new Int32Array(this.count);
+        let vertexCount = 0;
         const indexOf = (v) => {
             const x = Math.min(this.x[v], this.width - 1), y = Math.min(this.y[v], this.height - 1);
-            const isShared = samples && (x === this.width - 1 || y === this.height - 1);
-            const e = isShared ? samples.find(x, y) : -1;
-            if (e >= 0) return samples.index[e];
-            if (isShared) samples.add(x, y, 0, chosen.length);
-            return chosen.push(v) - 1;
+            if (this.isRim(x, y)) {
+                const e = samples.find(x, y);
+                if (e >= 0) return samples.index[e];
+                samples.add(x, y, 0, vertexCount);
+            }
+            chosen[vertexCount] = v;
+            return vertexCount++;
         };
         for (let i = 0; i < 3 * triangleCount; i++) {
             const v = this.triangles[i];
             if (index[v] < 0) index[v] = indexOf(v);
             triangles[i] = index[v];
         }
-        const vertexCount = chosen.length, col = new Int32Array(vertexCount), row = new Int32Array(vertexCount), q = new Int32Array(vertexCount);
+        const col = new Int32Array(vertexCount), row = new Int32Array(vertexCount), q = new Int32Array(vertexCount);
         const zFrom = new Float64Array(vertexCount), zTo = new Float64Array(vertexCount);
         const from = new Int32Array(vertexCount), to = new Int32Array(vertexCount);
-        chosen.forEach((v, i) => {
+        for (let i = 0; i < vertexCount; i++) {
+            const v = chosen[i];
             col[i] = Math.min(this.x[v], this.width - 1);
             row[i] = Math.min(this.y[v], this.height - 1);
             from[i] = this.numberOf(A, v);
@@ -297,7 +306,7 @@ class Union {
             zFrom[i] = before === before ? before : after;
             zTo[i] = after === after ? after : before;
             q[i] = Math.round(zTo[i]);
-        });
+        }
         return {...a, ...b, vertexCount, triangleCount, col, row, q, triangles, normals: null, errors: null, leaves: null, zFrom, zTo, from, to};
     }
 }

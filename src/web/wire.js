@@ -9,12 +9,13 @@
 import {checksumIsRight, Fold} from './checksum.js';
 import {readFrame} from './header.js';
 import {SampleTable} from './sample_table.js';
+import {isErrorSize, readErrors} from './wire_errors.js';
 import {slackOf, Walk} from './wire_walk.js';
 import {frameOf, inflate} from './zstd.js';
 
 const HEADER_BYTES = 144;
 const KIND_MESH = 1, KIND_DELTA = 2;
-const FLAG_NORMALS = 1;
+const FLAG_NORMALS = 1, FLAG_ERRORS = 2;
 const MOST_SAMPLES = 2 ** 20 + 1, MOST_BLOCK_K = 8, MOST_COUNT = 2 ** 31;
 const BLOCK_OF_ZSTD = 2 ** 17, LEAST_BLOCK = 4; // no zstd block of 4 bytes stands for more
 
@@ -50,7 +51,7 @@ function readHeader(bytes) {
     const version = bytes[4], kind = bytes[5], k = bytes[6], flags = bytes[7];
     if (version !== 1) throw new Error('a mesh of unknown format version');
     if (kind !== KIND_MESH && kind !== KIND_DELTA) throw new Error('the mesh is neither whole nor an increment');
-    if (flags > FLAG_NORMALS || flags && kind !== KIND_MESH)
+    if (flags > (FLAG_NORMALS | FLAG_ERRORS) || flags && kind !== KIND_MESH)
         throw new Error('the mesh has parts that this version does not know');
     if (!checksumIsRight(bytes, 8)) throw new Error("the mesh's checksum is wrong: its bytes have changed");
     const width = view.getUint32(112, true), height = view.getUint32(116, true);
@@ -68,16 +69,17 @@ function readHeader(bytes) {
     const vertexCount = number(16), triangleCount = number(24), payload = number(120);
     if (vertexCount >= MOST_COUNT || triangleCount >= MOST_COUNT)
         throw new Error('the mesh has more vertices or triangles than indices reach');
-    const parts = readParts(bytes, [payload, flags & FLAG_NORMALS ? 2 * vertexCount : -1]);
+    const parts = readParts(bytes, [(content) => content === payload, flags & FLAG_NORMALS && ((content) => content === 2 * vertexCount),
+        flags & FLAG_ERRORS && ((content) => isErrorSize(content, vertexCount))]);
     return {kind: 'mesh', k, K, width, height, ...frame, vertexCount, triangleCount, isDelta, epsFrom, from, payload, parts};
 }
 
-/** The frames behind the header, of contents that are known; -1: there is none. Nothing follows. */
-function readParts(bytes, contents) {
+/** The frames behind the header, each of a content of a size that its test likes; no test: there is none. Nothing follows. */
+function readParts(bytes, tests) {
     const wrong = () => new Error("the mesh's compressed bytes are cut off, or not what follows its header");
     let at = HEADER_BYTES;
-    const parts = contents.map((content) => {
-        if (content < 0) return null;
+    const parts = tests.map((isRight) => {
+        if (!isRight) return null;
         let part;
         try {
             part = frameOf(bytes, at);
@@ -85,7 +87,7 @@ function readParts(bytes, contents) {
             throw wrong();
         }
         const size = part.end - at;
-        if (part.content !== content || Math.floor(content / BLOCK_OF_ZSTD) > size / LEAST_BLOCK) throw wrong();
+        if (!isRight(part.content) || Math.floor(part.content / BLOCK_OF_ZSTD) > size / LEAST_BLOCK) throw wrong();
         at = part.end;
         return part;
     });
@@ -101,7 +103,7 @@ function decode(header, bytes, state, wantsLeaves) {
         throw new Error('the mesh claims more vertices or triangles than its bytes can hold');
     const walk = new Walk(header, inflate(bytes, parts[0], slackOf(header.k)), payload, wantsLeaves, state && priorOf(state));
     walk.run();
-    return {
+    const mesh = {
         ...fields, vertexCount, triangleCount,
         col: walk.col.slice(0, vertexCount), row: walk.row.slice(0, vertexCount), q: walk.heights.slice(0, vertexCount),
         triangles: new Uint32Array(walk.triangles.slice(0, 3 * triangleCount).buffer),
@@ -109,6 +111,8 @@ function decode(header, bytes, state, wantsLeaves) {
         errors: null,
         leaves: walk.leaves && walk.leaves.slice(0, 6 * triangleCount),
     };
+    if (parts[2]) mesh.errors = readErrors(inflate(bytes, parts[2]), mesh);
+    return mesh;
 }
 
 /** Two signed bytes of each vertex out of two planes of differences. */
