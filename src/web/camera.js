@@ -126,19 +126,25 @@ export function lookAtAll(camera, box, heights) {
     const {north, up} = scene.axes(middle), target = scene.point(middle);
     const pitch = -(38 + clamp((span - 5) / 30, 0, 1) * 46) * DEGREE;
     const direction = add(scaled(north, Math.cos(pitch)), up, Math.sin(pitch));
-    const fits = distance => {
+    let aim = 0; // degrees that the camera looks above the target
+    const seen = distance => {
         camera.set(add(target, direction, -distance), direction);
-        return points.every(point => {
-            const at = camera.project(point);
-            return at && Math.abs(at.x) < 0.94 && at.y < 0.9 && at.y > -0.94;
-        });
+        camera.turn(0, aim);
+        const at = points.map(point => camera.project(point)), ys = at.map(one => one ? one.y : Infinity);
+        const low = Math.min(...ys), high = Math.max(...ys);
+        return {middle: (low + high) / 2, fits: high - low < 1.8 && at.every(one => one && Math.abs(one.x) < 0.93)};
     };
-    let near = 0, far = 1;
-    while (!fits(far) && far < 1e10) far *= 2;
-    for (let round = 0; round < 24; round++) {
-        const half = (near + far) / 2;
-        if (fits(half)) far = half;
-        else near = half;
+    // What is near is large: so the picture's middle is not the target's. Each round gets nearer to it.
+    for (let round = 0; round < 4; round++) {
+        let near = 0, far = 1;
+        while (!seen(far).fits && far < 1e10) far *= 2;
+        for (let halving = 0; halving < 24; halving++) {
+            const half = (near + far) / 2;
+            if (seen(half).fits) far = half;
+            else near = half;
+        }
+        aim += Math.atan(seen(far).middle * Math.tan(camera.fovy / 2 * DEGREE)) / DEGREE;
     }
-    fits(far);
+    camera.set(camera.eye, direction);
+    camera.turn(0, aim);
 }

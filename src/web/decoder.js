@@ -1,34 +1,44 @@
 // decoder.js - the worker of the page: bytes of the service in, what can be shown out, so that the picture never waits.
 //
-// A job is {id, terrain, bytes, exaggeration, origin, withEdges, withMorph}. terrain: {crs, width, height, x0, y0, dx, dy}
-// when it is another than before, else null. bytes: a mesh in wire format, or null: the mesh of the job before, shown
-// otherwise. The answer is {id, mesh, geometry, morph, milliseconds} or {id, problem}, a sentence.
+// A job is {id, terrain, bytes, exaggeration, origin, withEdges, withMorph}. terrain: {isSpace, metre} when
+// it is another than before, else null. bytes: a mesh in wire format, or null: the mesh of the job before, shown otherwise.
+// The answer is {id, mesh, geometry, morph, milliseconds} or {id, problem}, a sentence.
 
-import {buildGeometry, Places} from './geometry.js';
+import {buildGeometry, buildMorph} from './geometry.js';
+import {morphMeshes} from './morph.js';
+import {Place} from './place.js';
 import {decodeMesh} from './wire.js';
 
-let places = null;
+const MOST_MORPHED = 150000; // vertices of both meshes: beyond, the picture would wait for the union longer than it moves
+
+let terrain = null;
 let last = null; // {mesh, exaggeration}: what is shown until the next answer
 
-function run({terrain, bytes, exaggeration, origin, withEdges}) {
-    if (terrain) {
-        places = new Places(terrain);
+function run({terrain: other, bytes, exaggeration, origin, withEdges, withMorph}) {
+    if (other) {
+        terrain = other;
         last = null;
     }
-    const mesh = bytes ? decodeMesh(bytes) : last.mesh;
-    const geometry = buildGeometry(places, mesh, exaggeration, origin, withEdges);
+    const placeOf = exaggerated => new Place({lonlat: terrain.isSpace, metre: terrain.metre, exaggeration: exaggerated});
+    const mesh = bytes ? decodeMesh(bytes, {leaves: true}) : last.mesh, place = placeOf(exaggeration), before = last;
     last = {mesh, exaggeration};
-    return {mesh, geometry, morph: null};
+    const isMoving = withMorph && before && (before.mesh !== mesh || before.exaggeration !== exaggeration) &&
+        before.mesh.vertexCount + mesh.vertexCount <= MOST_MORPHED;
+    const geometry = buildGeometry(mesh, place, origin, withEdges);
+    const morph = isMoving && buildMorph(
+        morphMeshes(before.mesh, mesh), before.mesh, mesh, placeOf(before.exaggeration), place, origin, withEdges);
+    return {mesh, geometry, morph: morph || null};
 }
 
 self.onmessage = ({data: job}) => {
     const started = performance.now();
     try {
         const answer = run(job);
-        const own = [answer.geometry, answer.morph].filter(Boolean)
-            .flatMap(({positions, heights, boxes, edges}) => [positions, heights, boxes, edges]).filter(Boolean);
-        const message = {id: job.id, ...answer, milliseconds: performance.now() - started};
-        self.postMessage(message, own.map(array => array.buffer));
+        const own = new Set([answer.geometry, answer.morph].flatMap(arrays => Object.values(arrays || {})));
+        // The mesh is needed here again: it is copied, all else is handed over.
+        for (const kept of Object.values(answer.mesh)) own.delete(kept);
+        const given = [...own].filter(ArrayBuffer.isView).map(array => array.buffer);
+        self.postMessage({id: job.id, ...answer, milliseconds: performance.now() - started}, given);
     } catch (error) {
         self.postMessage({id: job.id, problem: error.message});
     }

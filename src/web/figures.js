@@ -1,6 +1,6 @@
 // figures.js - what is told of the mesh in the picture: how many triangles, what they cost, and what is proved of them.
 
-import {bytes, count, metres, milliseconds, plain} from './format.js';
+import {bytes, count, metres, milliseconds, pixels, plain} from './format.js';
 
 const element = id => document.getElementById(id);
 
@@ -9,27 +9,28 @@ const allTriangles = ({width, height}) => 2 * (width - 1) * (height - 1);
 
 function share(shown, all) {
     const percent = 100 * shown / all;
-    return `${percent < 0.1 ? 'under 0.1' : plain(percent)} % of the ${count(all)} of every sample`;
+    return `${percent < 0.01 ? 'under 0.01' : plain(percent)} % of the full resolution's ${count(all)}`;
 }
 
-/** What the service proves of an answer, as a sentence; and is it what was asked for? */
+/** What the service proves of an answer, as a sentence; and does it prove anything? */
 export function promiseOf({wish, told}) {
-    if (wish.ask === 'range') {
-        const eps = Number.isFinite(told.achievedEps) ? told.achievedEps : wish.asked;
-        return {isProved: true, short: metres(eps), text: eps > 0
-            ? `Proved: nowhere more than ${metres(eps)} from any sample.` : 'Proved: every sample is met exactly.'};
+    const isRange = wish.ask === 'range', unit = isRange ? metres : pixels;
+    const reached = isRange ? told.achievedEps : told.achievedTau, tolerance = Number.isFinite(reached) ? reached : wish.asked;
+    const coarser = tolerance > wish.asked * 1.001 ? ` ${unit(wish.asked)} would take too many triangles.` : '';
+    if (isRange) {
+        const text = tolerance > 0 ? `nowhere more than ${unit(tolerance)} from any sample` : 'every sample is met exactly';
+        return {isProved: true, short: unit(tolerance), text: `Proved: ${text}.${coarser}`};
     }
-    const tau = Number.isFinite(told.achievedTau) ? told.achievedTau : wish.asked;
-    const coarser = tau > wish.asked * 1.001 ? ` ${plain(wish.asked)} px would take more triangles than are asked for.` : '';
     if (told.guaranteed === 0)
-        return {isProved: false, short: `about ${plain(tau)} px`, text: `About ${plain(tau)} px on screen; not proved for this view.`};
-    return {isProved: true, short: `${plain(tau)} px`, text: `Proved: no sample in the picture is off by more than ${plain(tau)} px.${coarser}`};
+        return {isProved: false, short: `about ${unit(tolerance)}`, text: `About ${unit(tolerance)} on screen, not proved.${coarser}`};
+    const text = `Proved: no sample in the picture is off by more than ${unit(tolerance)}.${coarser}`;
+    return {isProved: true, short: unit(tolerance), text};
 }
 
 export class Figures {
     constructor() {
         this.values = new Map();
-        for (const name of ['Vertices', 'Received', 'Answer', 'Decoding', 'Frame', 'Eye above ground', 'Eye at']) {
+        for (const name of ['Vertices', 'Received', 'Answer', 'Decoding', 'Frame', 'Above ground', 'Eye']) {
             const term = document.createElement('dt'), value = document.createElement('dd');
             term.textContent = name;
             value.textContent = '\u2013';
@@ -52,7 +53,7 @@ export class Figures {
         element('promise').classList.toggle('unproved', !promise.isProved);
         element('summary').textContent = `${count(triangleCount)} triangles, ${promise.short}`;
         this.set('Vertices', count(vertexCount));
-        this.set('Received', `${bytes(stage.bytes)}, ${plain(8 * stage.bytes / Math.max(1, vertexCount))} bits a vertex`);
+        this.set('Received', `${bytes(stage.bytes)}, ${bytes(Number(plain(stage.bytes / Math.max(1, vertexCount))))} a vertex`);
         this.set('Answer', milliseconds(stage.milliseconds.answer));
         this.set('Decoding', milliseconds(stage.milliseconds.decode));
     }
@@ -64,7 +65,7 @@ export class Figures {
     }
 
     showEye(clearance, place) {
-        this.set('Eye above ground', Number.isNaN(clearance) ? '\u2013' : metres(clearance));
-        this.set('Eye at', place);
+        this.set('Above ground', Number.isNaN(clearance) ? '\u2013' : metres(clearance));
+        this.set('Eye', place);
     }
 }

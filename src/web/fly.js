@@ -4,7 +4,7 @@ import {add, scaled} from './scene.js';
 import {moveAlongGround} from './orbit.js';
 
 const TURN = 40; // degrees for a drag over half the picture
-const LEAST_SPEED = 4; // metres a second
+const LEAST_SPEED = 8; // metres a second
 
 export class Fly {
     /**

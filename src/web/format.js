@@ -15,8 +15,13 @@ export function plain(value) {
 export const metres = value =>
     Math.abs(value) >= 10000 ? `${plain(value / 1000)}\u00a0km` : `${plain(value)}\u00a0m`;
 
+export const pixels = value => `${plain(value)}\u00a0px`;
+
 /** A height as a surveyor reads it: to the centimetre. */
-export const height = value => `${value.toFixed(2)}\u00a0m`;
+export function height(value) {
+    const [whole, part] = Math.abs(value).toFixed(2).split('.');
+    return `${value < 0 ? '\u2212' : ''}${count(Number(whole))}.${part}\u00a0m`;
+}
 
 export function bytes(value) {
     if (value < 1000) return `${value}\u00a0B`;
@@ -25,9 +30,10 @@ export function bytes(value) {
 
 export const milliseconds = value => `${plain(Math.max(value, 0.1))}\u00a0ms`;
 
-/** x and y of the CRS: degrees to a decimetre, or metres likewise. */
-export function place(x, y, isSpace) {
+/** x and y of the CRS: degrees with so many digits behind the point, or units to a tenth. */
+export function place(x, y, isSpace, digits) {
     if (!isSpace) return `${x.toFixed(1)}, ${y.toFixed(1)}`;
-    const degrees = (value, positive, negative) => `${Math.abs(value).toFixed(6)}\u00b0\u00a0${value < 0 ? negative : positive}`;
+    const degrees = (value, positive, negative) =>
+        `${Math.abs(value).toFixed(digits)}\u00b0\u00a0${value < 0 ? negative : positive}`;
     return `${degrees(y, 'N', 'S')}, ${degrees(x, 'E', 'W')}`;
 }

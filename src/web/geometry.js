@@ -3,61 +3,16 @@
 // Positions are single-precision differences to an origin that is a point in double precision. The origin is near the eye
 // for which the mesh was made: a difference is then as fine as its distance from the eye asks, by 2^-24 of it.
 
-import {createScene} from './scene.js';
+import {metresOf} from './header.js';
+import {normalOf} from './wire.js';
 
 /** Triangles in a box of the picking structure: meshes come in the order of a walk, so that neighbours are together. */
 export const CHUNK = 128;
 
-const DEGREE = Math.PI / 180;
-
-/**
- * Where the samples of one terrain are, quickly: sines and cosines are of columns and of rows.
- * @param terrain {crs, width, height, x0, y0, dx, dy}
- */
-export class Places {
-    constructor({crs, width, height, x0, y0, dx, dy}) {
-        Object.assign(this, {x0, y0, dx, dy, scene: createScene(crs)});
-        if (!this.scene.isSpace) return;
-        const table = (count, start, step) => {
-            const sine = new Float64Array(count), cosine = new Float64Array(count);
-            for (let i = 0; i < count; i++) {
-                sine[i] = Math.sin((start + i * step) * DEGREE);
-                cosine[i] = Math.cos((start + i * step) * DEGREE);
-            }
-            return {sine, cosine};
-        };
-        this.columns = table(width, x0, dx);
-        this.rows = table(height, y0, dy);
-    }
-
-    /** Positions of samples of these heights (metres, exaggerated here), as differences to origin. */
-    positions(col, row, heights, exaggeration, origin) {
-        const out = new Float32Array(3 * col.length), [ox, oy, oz] = origin;
-        if (!this.scene.isSpace) {
-            const {x0, y0, dx, dy} = this, {metre} = this.scene;
-            for (let v = 0, i = 0; v < col.length; v++) {
-                out[i++] = (x0 + col[v] * dx) * metre - ox;
-                out[i++] = (y0 + row[v] * dy) * metre - oy;
-                out[i++] = heights[v] * exaggeration - oz;
-            }
-            return out;
-        }
-        const {a, e2} = this.scene, {columns, rows} = this;
-        for (let v = 0, i = 0; v < col.length; v++) {
-            const sine = rows.sine[row[v]], height = heights[v] * exaggeration;
-            const n = a / Math.sqrt(1 - e2 * sine * sine), across = (n + height) * rows.cosine[row[v]];
-            out[i++] = across * columns.cosine[col[v]] - ox;
-            out[i++] = across * columns.sine[col[v]] - oy;
-            out[i++] = (n * (1 - e2) + height) * sine - oz;
-        }
-        return out;
-    }
-}
-
-/** Metres of the heights q of a mesh (FORMAT.md, Mesh). */
-export function metresOf(mesh, q) {
-    const factor = mesh.scale * (mesh.numerator / mesh.denominator), out = new Float32Array(q.length);
-    for (let v = 0; v < q.length; v++) out[v] = (mesh.z0 + q[v] / mesh.d) * factor + mesh.offset;
+/** Metres of heights in quanta. */
+function metresAll(mesh, heights) {
+    const out = new Float32Array(heights.length);
+    for (let v = 0; v < heights.length; v++) out[v] = metresOf(mesh, heights[v]);
     return out;
 }
 
@@ -65,12 +20,8 @@ export function metresOf(mesh, q) {
 function unpackNormals(packed) {
     const count = packed.length / 2, out = new Int8Array(4 * count);
     for (let v = 0; v < count; v++) {
-        const a = packed[2 * v] / 127, b = packed[2 * v + 1] / 127;
-        const x = (a + b) / 2, y = (a - b) / 2, z = 1 - Math.max(Math.abs(a), Math.abs(b));
-        const by = 127 / Math.hypot(x, y, z);
-        out[4 * v] = Math.round(x * by);
-        out[4 * v + 1] = Math.round(y * by);
-        out[4 * v + 2] = Math.round(z * by);
+        const normal = normalOf(packed[2 * v], packed[2 * v + 1]);
+        for (let axis = 0; axis < 3; axis++) out[4 * v + axis] = Math.round(127 * normal[axis]);
     }
     return out;
 }
@@ -111,22 +62,54 @@ export function edgesOf(triangles) {
 }
 
 /**
- * @param {Places} places
  * @param mesh of wire.js
- * @param origin a point of the scene
+ * @param {Place} place with the exaggeration to be shown
+ * @param {Vector} origin a point of the scene
  * @return {{origin, positions, heights, normals, errors, triangles, boxes, edges}}: what terrain_layer.js shows
  */
-export function buildGeometry(places, mesh, exaggeration, origin, withEdges) {
-    const heights = metresOf(mesh, mesh.q);
-    const positions = places.positions(mesh.col, mesh.row, heights, exaggeration, origin);
+export function buildGeometry(mesh, place, origin, withEdges) {
+    const positions = place.positionsOf(mesh, origin);
     return {
         origin,
         positions,
-        heights,
+        heights: metresAll(mesh, mesh.q),
         normals: mesh.normals && unpackNormals(mesh.normals),
         errors: mesh.errors && Float32Array.from(mesh.errors),
         triangles: mesh.triangles,
         boxes: boxesOf(positions, mesh.triangles),
         edges: withEdges ? edgesOf(mesh.triangles) : null,
+    };
+}
+
+/**
+ * What a geomorph shows: the union of two meshes, with where its vertices begin and end.
+ * @param union of morph.js
+ * @param a the mesh it begins with, b the one it ends with
+ * @param {Place} placeFrom with the exaggeration at its beginning, placeTo with that at its end
+ */
+export function buildMorph(union, a, b, placeFrom, placeTo, origin, withEdges) {
+    const {vertexCount, from, to, triangles} = union, ofA = a.normals && unpackNormals(a.normals);
+    const ofB = b.normals && unpackNormals(b.normals), normals = new Int8Array(4 * vertexCount);
+    const errors = a.errors && b.errors ? new Float32Array(vertexCount) : null;
+    for (let v = 0; v < vertexCount; v++) {
+        // A vertex has one normal and one error, whatever mesh it is in; one that is in neither is level with others.
+        const source = to[v] >= 0 ? ofB : ofA, i = to[v] >= 0 ? to[v] : from[v];
+        if (i < 0) {
+            normals[4 * v + 2] = 127;
+            continue;
+        }
+        for (let axis = 0; axis < 3; axis++) normals[4 * v + axis] = source[4 * i + axis];
+        if (errors) errors[v] = (to[v] >= 0 ? b : a).errors[i];
+    }
+    return {
+        origin,
+        positions: placeTo.positionsOf(union, origin, union.zTo),
+        positionsFrom: placeFrom.positionsOf(union, origin, union.zFrom),
+        heights: metresAll(union, union.zTo),
+        heightsFrom: metresAll(union, union.zFrom),
+        normals,
+        errors,
+        triangles,
+        edges: withEdges ? edgesOf(triangles) : null,
     };
 }

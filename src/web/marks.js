@@ -42,7 +42,7 @@ export class Marks {
     /** Takes the accent colour of the page, which may have gone from light to dark. */
     restyle() {
         const accent = getComputedStyle(document.documentElement).getPropertyValue('--accent').trim();
-        for (const {material} of this.lines) material.color.set(accent).convertLinearToSRGB();
+        for (const {material} of this.lines) material.color.set(accent);
     }
 
     /** Puts the pin of a name at a point of the scene; a null point takes it away. */

@@ -16,10 +16,10 @@ in float heightFrom;
 in float error;
 uniform float t;
 uniform float exaggeration;
-out vec3 shadingNormal;
-out float metres;
-out float metresOff;
-out float depth;
+centroid out vec3 shadingNormal;
+centroid out float metres;
+centroid out float metresOff;
+centroid out float depth;
 void main() {
     vec4 seen = modelViewMatrix * vec4(mix(from, position, t), 1.0);
     gl_Position = projectionMatrix * seen;
@@ -41,10 +41,10 @@ uniform float logDepthBufFC;
 uniform sampler2D land;
 uniform sampler2D sea;
 uniform sampler2D errors;
-in vec3 shadingNormal;
-in float metres;
-in float metresOff;
-in float depth;
+centroid in vec3 shadingNormal;
+centroid in float metres;
+centroid in float metresOff;
+centroid in float depth;
 out vec4 colour;
 
 vec3 tint() {
@@ -63,7 +63,7 @@ void main() {
     float sun = max(dot(n, normalize(vec3(-1.0, 1.0, 1.1))), 0.0);
     float sky = 0.5 + 0.5 * n.z;
     float west = max(dot(n, normalize(vec3(-1.0, -0.6, 0.6))), 0.0);
-    float shade = 0.16 + 0.24 * sky + 0.66 * sun + 0.16 * west;
+    float shade = 0.24 + 0.26 * sky + 0.54 * sun + 0.16 * west;
     // Errors keep their lightness, by which they are read.
     if (colouring == 1) shade = 0.62 + 0.44 * shade;
     vec3 lit = tint() * min(shade * 1.06, 1.25);
@@ -79,7 +79,7 @@ const EDGE_FRAGMENT = /* glsl */ `
 precision highp float;
 uniform vec4 edgeColour;
 uniform float logDepthBufFC;
-in float depth;
+centroid in float depth;
 out vec4 colour;
 void main() {
     colour = edgeColour;
@@ -97,7 +97,7 @@ export function createMaterials() {
         hazeDistance: {value: 1e9},
         hazeColour: {value: [1, 1, 1]},
         wires: {value: 0},
-        edgeColour: {value: [0.05, 0.07, 0.1, 0.45]},
+        edgeColour: {value: [0.05, 0.07, 0.1, 0.38]},
         land: {value: rampTexture(LAND)},
         sea: {value: rampTexture(SEA)},
         errors: {value: rampTexture(ERROR)},

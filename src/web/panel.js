@@ -2,7 +2,7 @@
 //
 // Tolerances go by steps that read well (1, 1.5, 2, 3, ...): a slider is a place in a list.
 
-import {count, metres, plain} from './format.js';
+import {count, metres, pixels, plain} from './format.js';
 
 export const TAUS = [0.5, 0.7, 1, 1.5, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64];
 export const EPSES = [0, 0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5, 7, 10, 15, 20, 30, 50, 70, 100, 150, 200, 300, 500, 700, 1000];
@@ -45,7 +45,7 @@ export class Panel {
         element('terrain').value = settings.terrain;
         element('tau-row').hidden = settings.ask !== 'view';
         element('eps-row').hidden = settings.ask !== 'range';
-        this.slide('tau', nearest(TAUS, settings.tau), `${plain(settings.tau)}\u00a0px`);
+        this.slide('tau', nearest(TAUS, settings.tau), pixels(settings.tau));
         this.slide('eps', nearest(EPSES, settings.eps), metres(settings.eps));
         this.slide('exaggeration', settings.exaggeration, `${plain(settings.exaggeration)}\u00a0\u00d7`);
         const {width, height, min_z: lowest, max_z: highest} = terrain.terrain;

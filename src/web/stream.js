@@ -6,6 +6,8 @@
 
 import {askMesh} from './service.js';
 
+const RETRY_MILLISECONDS = 3000;
+
 const keyOf = wish => `${wish.exaggeration} ${wish.withEdges} ${wish.path}`;
 
 export class Stream {
@@ -44,10 +46,11 @@ export class Stream {
         if (!this.isBusy) this.run();
     }
 
-    /** Forgets that the last wish could not be fulfilled: it may be asked again. */
-    retry() {
+    /** Asks again what could not be answered, if it is still wanted. */
+    retry(wish) {
+        if (this.isBusy || keyOf(wish) !== this.doneKey) return;
         this.doneKey = '';
-        if (this.wanted && !this.isBusy) this.run();
+        this.run();
     }
 
     async run() {
@@ -59,6 +62,7 @@ export class Stream {
             } catch (problem) {
                 this.path = ''; // what the worker has may not be what is shown
                 this.fail(problem.message);
+                if (problem.mayPass) setTimeout(() => this.retry(wish), RETRY_MILLISECONDS);
             }
             this.doneKey = keyOf(wish);
         }
