@@ -1,8 +1,8 @@
 #!/usr/bin/python3
 """meshes.py OUT WHAT - meshes of terrains as the bytes that SQL gives, for the tests of src/web.
 
-OUT holds records: 1 byte what ('M' a mesh in wire format, 'D' an increment of rqt_delta on the one before, 'I' an increment of a view, 'Z' a zstd
-frame, 'P' what the one before stands for, 'J' JSON), 4 bytes each the sizes of name and bytes, the name, the bytes.
+OUT holds records: 1 byte what ('M' a mesh in wire format, 'D' an increment of rqt_delta on the one before, 'I' an increment of a view, 'X' the
+mesh before in format indexed, 'Z' a zstd frame, 'P' what the one before stands for, 'J' JSON), 4 bytes each the sizes of name and bytes, the name, the bytes.
 """
 import ctypes
 import ctypes.util
@@ -59,7 +59,8 @@ def wire():
             put("M", "%s %s" % (name, extra), one(db, "SELECT rqt_mesh(NULL, 4, ?)", "rqt+" + extra))
         if width > 30:
             for eps in (2, 40):
-                put("M", name + " tol", one(db, "SELECT rqt_mesh(NULL, ?, 'rqt', NULL, '{\"outline\":\"tol\"}')", eps))
+                for what, form in (("M", "rqt"), ("X", "indexed")):
+                    put(what, "%s tol %d" % (name, eps), one(db, "SELECT rqt_mesh(NULL, ?, ?, NULL, '{\"outline\":\"tol\"}')", eps, form))
     for file, block in (("glarus_1arc_native_161.tif", 5), ("glarus_alpine_25m_161.tif", 7), ("SainteHelens.dem", 7), ("N42E001.hgt.zip", 8)):
         db = terrain(file.split(".")[0], os.path.join(s.DATA, file), block=block)
         for eps in (0, 5, 50) if not file.startswith("N4") else (10, 50):
