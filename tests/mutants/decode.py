@@ -10,7 +10,7 @@ MUTANTS = [
     ("page: a block leaves its vertices behind", "src/web/wire_walk.js", "this.memo[this.touched[i]] = NONE;", "this.memo[this.touched[i]] = this.touched[i] % 7 ? NONE : CHOSEN;",
      WIRE, SAME),
     ("page: normals are not sums", "src/web/wire.js", "at += planes[plane * count + i];", "at = planes[plane * count + i];", WIRE, SAME),
-    ("page: errors have no children", "src/web/wire_errors.js", "codes[table.index[parent]] = code;", "", WIRE, SAME),
+    ("page: errors have no children", "src/web/wire_errors.js", "codes[table.index[parent]] = code;", "continue;", WIRE, SAME),
     ("page: an increment of a mesh knows no sample", "src/web/wire.js", "if (prior.find(mesh.col[i], mesh.row[i]) < 0) prior.add(mesh.col[i], mesh.row[i], mesh.q[i], 0);", "",
      WIRE, "increments of rqt_delta"),
     ("page: streams may have bits left", "src/web/wire_walk.js", "at[i] % 8 && this.payload[begin[i] + Math.floor(at[i] / 8)] >> at[i] % 8) bad();", "at[i] < 0) bad();", HOSTILE, SPOILED),
