@@ -26,6 +26,7 @@ import {Stream} from './stream.js';
 import {TerrainLayer} from './terrain_layer.js';
 import {place as placeText} from './format.js';
 
+const HINT_MILLISECONDS = 10000;
 const CLEARANCE = 1.7; // metres: the eye does not get into the ground
 const USUAL = {ask: 'view', tau: 1, eps: 5, colour: 'relief', wires: false, morph: true, mode: 'orbit', tool: 'height', exaggeration: 1};
 
@@ -73,6 +74,7 @@ export class Viewer {
         element('help').addEventListener('click', event => event.target === element('help') && element('help').close());
         element('problem').querySelector('button').addEventListener('click', () => this.fail(''));
         matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.restyle());
+        setTimeout(() => element('hint').classList.add('gone'), HINT_MILLISECONDS);
         this.restyle();
     }
 
