@@ -141,7 +141,7 @@ export class Viewer {
         let done = 0;
         this.glide.begin(t => {
             if (isOrbit) {
-                this.orbit.anchor = anchor;
+                Object.assign(this.orbit, {anchor, at: [0, 0]});
                 this.orbit.turn((t - done) * yaw * Math.PI / 180, 0);
                 this.orbit.end();
                 if (t === 1) this.camera.yaw = 0;
