@@ -111,7 +111,7 @@ try:
 except sqlite3.Error as error:
     check("of views, too", "rqt_view_answer(): the mesh has more than 100 triangles" in str(error), error)
 equal("lonlat, metre, semi_major, inverse_flattening, crs_name", rows(
-    db, "SELECT name, lonlat, metre, semi_major, inverse_flattening, crs_name FROM rqt_terrains ORDER BY name"),
-    [("clarke", 1, None, 6378206.4, 294.978698213898, "NAD27"), ("feet", 0, 1200 / 3937, None, None, "NAD27 / California zone I"),
+    db, "SELECT name, lonlat, round(metre, 12), semi_major, inverse_flattening, crs_name FROM rqt_terrains ORDER BY name"),
+    [("clarke", 1, None, 6378206.4, 294.978698213898, "NAD27"), ("feet", 0, round(1200 / 3937, 12), None, None, "NAD27 / California zone I"),
      ("globe", 1, None, 6378137.0, 298.257223563, "WGS 84"), ("hills", 0, 1.0, None, None, None)])
 s.finish()

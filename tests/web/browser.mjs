@@ -8,7 +8,7 @@ import {vanishingPoint} from './space.mjs';
 const {chromium} = requirePackage('playwright-core');
 const SHOTS = process.env.WEB_SHOTS || join(ROOT, 'build', 'web-shots');
 /** Milliseconds until a wait is given up: no measure of anything. */
-export const PATIENCE = 120000;
+export const PATIENCE = Number(process.env.WEB_PATIENCE || 60000);
 /** What the terrain never has: the background of the pictures in which gaps are looked for. */
 const BACKGROUND = [1, 0, 1];
 
@@ -53,14 +53,15 @@ export async function openPage(browser, service, {width, height, touch = false, 
     if (record) await page.addInitScript(recordFrames, {findGaps: findGaps.toString(), vanishingPoint: vanishingPoint.toString(), background: BACKGROUND, slow});
     await prepare(page);
     await page.goto(service.url + path);
-    await page.waitForFunction(() => window.rqtViewer?.ready);
+    await page.evaluate(() => window.rqtViewer.ready);
     return Object.assign(new View(), {page, context, problems, asked});
 }
 
 export class View {
-    /** The page's own account of what it shows. */
-    state() {
-        return this.page.evaluate(() => window.rqtViewer.state());
+    /** The page's own account of what it shows: camera, terrain, settings and figures, in one. */
+    async state() {
+        const {settings, figures, ...state} = await this.page.evaluate(() => window.rqtViewer.state());
+        return {...settings, ...figures, ...state};
     }
 
     async setCamera(camera) {
@@ -89,6 +90,12 @@ export class View {
     async shot(name) {
         mkdirSync(SHOTS, {recursive: true});
         await this.page.screenshot({path: join(SHOTS, `${name}.png`)});
+    }
+
+    /** Keeps the first frames that had gaps, too. */
+    async keepGaps(name) {
+        const found = await this.page.evaluate(() => window.withGaps || []);
+        found.forEach((url, i) => writeFileSync(join(SHOTS, `${name}-gap${i}.png`), Buffer.from(url.split(',')[1], 'base64')));
     }
 
     /** What recordFrames saw since the last call: [{count, at, terrain, ...}] with one entry a frame. */
@@ -132,15 +139,11 @@ export function keepingShots(name, views, body) {
         try {
             await body(t);
         } catch (error) {
-            for (const [i, view] of views().entries()) await view.shot(`FAILED ${name} ${i}`.replace(/[^\w.-]+/g, '_')).catch(() => {});
+            const file = `FAILED-${name}`.replace(/[^\w.-]+/g, '-');
+            for (const view of views()) await view.shot(file).then(() => view.keepGaps(file)).catch(() => {});
             throw error;
         }
     };
-}
-
-export function keepText(name, text) {
-    mkdirSync(SHOTS, {recursive: true});
-    writeFileSync(join(SHOTS, name), text);
 }
 
 /**
@@ -156,6 +159,7 @@ function recordFrames({findGaps, vanishingPoint, background, slow}) {
     const request = window.requestAnimationFrame.bind(window), now = performance.now.bind(performance);
     let drawn = null;
     window.recordedFrames = [];
+    window.withGaps = [];
     window.pictures = [];
     performance.now = () => now() / slow;
     gl.clearColor = function () {
@@ -177,8 +181,11 @@ function recordFrames({findGaps, vanishingPoint, background, slow}) {
         drawn = null;
         const {data} = context.getImageData(0, 0, width, height), shows = new Uint8Array(width * height);
         for (let i = 0; i < shows.length; i++) shows[i] = Math.min(data[4 * i], data[4 * i + 2]) - data[4 * i + 1] > 24 ? 1 : 0;
-        const {camera} = window.rqtViewer.state();
-        window.recordedFrames.push({...gapsOf(shows, width, height, vanishing({...camera, width, height})), camera});
+        const camera = window.rqtViewer.state?.().camera;
+        if (!camera) return;
+        const found = gapsOf(shows, width, height, vanishing({...camera, width, height}));
+        window.recordedFrames.push({...found, camera});
+        if (found.count && window.withGaps.length < 3) window.withGaps.push(copy.toDataURL());
         if (window.keepPictures) window.pictures.push(new Uint32Array(data.buffer));
     };
     window.requestAnimationFrame = callback => request(() => {

@@ -23,7 +23,7 @@ async function open(terrain = 'metres', options = {}) {
 
 /** Until the page's own account of itself is as `is` wants it; then settled. */
 async function until(view, is, argument) {
-    await view.page.waitForFunction(`(${is})(window.rqtViewer.state(), ${JSON.stringify(argument)})`);
+    await view.page.waitForFunction(`(${is})({...window.rqtViewer.state().settings, ...window.rqtViewer.state()}, ${JSON.stringify(argument ?? null)})`);
     await view.settled();
     return view.state();
 }

@@ -53,10 +53,11 @@ function* steps() {
 
 async function camerasOver(terrain) {
     const [box] = await sql('SELECT x0, y0, dx, dy, width, height, max_z FROM rqt_terrains WHERE name = :terrain', {terrain});
-    const cameras = [];
+    // Heights of the steps are for a hundred kilometres; a small terrain is flown over lower.
+    const cameras = [], lower = above => above > 300 ? above * Math.min(1, box.height / 600) : above;
     for (const {u, v, above, over, yaw, pitch, stay} of steps()) {
         const x = box.x0 + u * (box.width - 1) * box.dx, y = box.y0 + (1 - v) * (box.height - 1) * box.dy;
-        cameras.push({x, y, above, over, stay, camera: {yaw, pitch, fovy: 45, position: 'crs'}});
+        cameras.push({x, y, above: lower(above), over, stay, camera: {yaw, pitch, fovy: 45, position: 'crs'}});
     }
     const values = cameras.map(({x, y}) => `(${x}, ${y})`).join(', ');
     const heights = await sql(`SELECT rqt_height(column1, column2, 0, :terrain) AS z FROM (VALUES ${values})`, {terrain});

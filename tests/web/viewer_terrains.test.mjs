@@ -34,7 +34,10 @@ for (const terrain of Object.keys(TERRAINS))
             await view.shot(`${terrain}-${size}`);
             assert.equal(state.terrain, terrain);
             assert.deepEqual(JSON.parse(camera), state.camera, 'the camera that is told is the one that was asked with');
-            assert.deepEqual([state.camera.width, state.camera.height], [viewport.width, viewport.height]);
+            assert.deepEqual([state.camera.width, state.camera.height], await view.page.evaluate(() => {
+                const {clientWidth, clientHeight} = document.querySelector('canvas');
+                return [clientWidth, clientHeight];
+            }));
             assert.equal(JSON.parse(options).cover, 'terrain');
             const [told] = await sql(
                 `SELECT count(*) AS triangles, max(achieved_tau) AS tau, min(guaranteed) AS guaranteed

@@ -11,7 +11,7 @@ const meshes = decodeInC(records);
 function difference(mesh, expected) {
     if (!expected) return 'the C decoder says no';
     for (const name of ['vertexCount', 'triangleCount']) if (mesh[name] !== expected[name]) return `${name} ${mesh[name]}, not ${expected[name]}`;
-    for (const name of ['col', 'row', 'q', 'triangles']) if (!isSame(mesh[name], expected[name])) return name;
+    for (const name of ['col', 'row', 'q', 'triangles', 'errors']) if (!isSame(mesh[name], expected[name])) return name;
     if ((mesh.normals === null) !== (expected.normals === null)) return 'normals';
     for (let i = 0; mesh.normals && i < mesh.vertexCount; i++) {
         const normal = normalOf(mesh.normals[2 * i], mesh.normals[2 * i + 1]);
@@ -21,15 +21,18 @@ function difference(mesh, expected) {
 }
 
 test('every mesh is the C decoder\'s, bit for bit', () => {
-    let vertices = 0, normals = 0;
+    const whole = records.filter(({what}) => what === 'M'), again = decodeInC(whole.map(({bytes}) => ({what: 'W', bytes})));
+    whole.forEach(({name, bytes}, i) => assert.equal(difference(decodeMesh(bytes), again[i]), '', `${name}, without leaves`));
+    let vertices = 0, normals = 0, errors = 0;
     records.forEach(({what, name, bytes}, i) => {
         if (what !== 'M') return;
         const mesh = decodeMesh(bytes);
         assert.equal(difference(mesh, meshes[i]), '', name);
         vertices += mesh.vertexCount;
         normals += mesh.normals !== null;
+        errors += mesh.errors !== null;
     });
-    assert.ok(vertices > 500000 && normals > 5, `${vertices} vertices, ${normals} with normals`);
+    assert.ok(vertices > 500000 && normals > 20 && errors > 20, `${vertices} vertices, ${normals} ${errors}`);
 });
 
 test('increments of rqt_delta end in the C decoder\'s meshes, bit for bit', () => {
