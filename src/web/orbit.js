@@ -11,9 +11,10 @@ export class Orbit {
     /**
      * @param camera of camera.js
      * @param pick gives the point of the ground in the picture, or null
+     * @param furthest metres from the ground beyond which there is nothing to see
      */
-    constructor(camera, pick) {
-        Object.assign(this, {camera, pick, anchor: null, distance: 0});
+    constructor(camera, pick, furthest) {
+        Object.assign(this, {camera, pick, furthest, anchor: null, at: [0, 0], distance: 0});
     }
 
     /** The ground there, or where nothing is, a point as far away as the last one was. */
@@ -74,7 +75,8 @@ export class Orbit {
     /** Goes nearer (factor below 1) to what is at a place of the picture, or away from it. */
     zoom(factor, at) {
         const {camera} = this, point = this.anchor || this.pointAt(at), held = this.anchor ? this.at : at;
-        camera.eye = add(point, scaled(subtract(camera.eye, point), factor));
+        const arm = subtract(camera.eye, point), most = Math.max(1, this.furthest / length(arm));
+        camera.eye = add(point, scaled(arm, Math.min(factor, most)));
         camera.hold(point, held);
     }
 

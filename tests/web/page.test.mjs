@@ -106,7 +106,7 @@ test('orbit: the ground that is held stays where it is in the picture, or under 
             const camera = randomCamera(scene);
             camera.pitch = random(-70, -15);
             const distance = random(1.2, 4) * camera.place[2], at = [random(-0.6, 0.6), random(-0.6, 0.6)];
-            const point = add(camera.eye, camera.direction(...at), distance), orbit = new Orbit(camera, () => point);
+            const point = add(camera.eye, camera.direction(...at), distance), orbit = new Orbit(camera, () => point, 1e9);
             const seen = () => { const {x, y} = camera.project(point); return [x, y]; };
             orbit.begin(at);
             orbit.drag('turn', at, [at[0] + 0.2, at[1] - 0.1]);
@@ -128,6 +128,12 @@ test('orbit: the ground that is held stays where it is in the picture, or under 
             moves += moved && !isSteep;
         }
     assert.ok(moves > 100, `${moves}`);
+});
+
+test('orbit: nobody gets lost by zooming out', () => {
+    const camera = randomCamera(SCENES.bare), point = add(camera.eye, camera.direction(0, 0), 1000), orbit = new Orbit(camera, () => point, 5000);
+    for (let i = 0; i < 20; i++) orbit.zoom(1.5, [0, 0]);
+    near([length(subtract(camera.eye, point))], [5000], 1e-6, 'as far as there is something to see');
 });
 
 test('flying is as fast as the ground is far, and level flight keeps its height round the Earth', () => {
