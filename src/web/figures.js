@@ -53,7 +53,7 @@ export class Figures {
         element('promise').classList.toggle('unproved', !promise.isProved);
         element('summary').textContent = `${count(triangleCount)} triangles, ${promise.short}`;
         this.set('Vertices', count(vertexCount));
-        this.set('Received', `${bytes(stage.bytes)}, ${bytes(Number(plain(stage.bytes / Math.max(1, vertexCount))))} a vertex`);
+        this.set('Received', `${bytes(stage.bytes)}, ${(stage.bytes / Math.max(1, vertexCount)).toFixed(1)} B/vertex`);
         this.set('Answer', milliseconds(stage.milliseconds.answer));
         this.set('Decoding', milliseconds(stage.milliseconds.decode));
     }

@@ -324,6 +324,8 @@ export class Viewer {
 
     draw(now) {
         const clearance = this.keepAboveGround(), started = performance.now(), {frames, camera, extent} = this;
+        // It is where its JSON and the address say, to the last bit: both show the same picture.
+        camera.read(camera.json(this.settings.tau));
         this.layer.uniforms.hazeDistance.value = extent.radius * 3;
         if (!this.isLost) this.picture.draw(camera, Number.isNaN(clearance) ? extent.radius : clearance, extent);
         frames.cost = performance.now() - started;
