@@ -150,12 +150,16 @@ export function keepingShots(name, views, body) {
  * In the page, before its own scripts: paints the background in a colour of its own and reads the canvas after each frame,
  * within the same task, as it will be shown. A pixel with a share of that colour counts as background: edges are smoothed.
  *
+ * The software that stands in for a graphics card cuts triangles off at the picture's border, each for itself: the two sides
+ * of an edge across the border then differ by a subpixel, and now and then the background shines through. Graphics cards
+ * have a guard band, in which nothing is cut off; here a viewport twice as large under half the projection is one.
+ *
  * window.leaveOut = n leaves the n-th triangle out of what is drawn.
  */
 function recordFrames({findGaps, vanishingPoint, background, slow}) {
     const make = text => new Function(`return (${text})`)();
     const gapsOf = make(findGaps), vanishing = make(vanishingPoint), gl = WebGL2RenderingContext.prototype;
-    const {clearColor, drawElements} = gl, copy = document.createElement('canvas');
+    const {clearColor, drawElements, getUniformLocation, uniformMatrix4fv, viewport} = gl, projections = new WeakSet(), copy = document.createElement('canvas');
     const request = window.requestAnimationFrame.bind(window), now = performance.now.bind(performance);
     let drawn = null;
     window.recordedFrames = [];
@@ -164,6 +168,18 @@ function recordFrames({findGaps, vanishingPoint, background, slow}) {
     performance.now = () => now() / slow;
     gl.clearColor = function () {
         clearColor.call(this, ...background, 1);
+    };
+    gl.viewport = function (x, y, width, height) {
+        viewport.call(this, x - width / 2, y - height / 2, 2 * width, 2 * height);
+    };
+    gl.getUniformLocation = function (program, name) {
+        const location = getUniformLocation.call(this, program, name);
+        if (location && name === 'projectionMatrix') projections.add(location);
+        return location;
+    };
+    gl.uniformMatrix4fv = function (location, transpose, matrix) {
+        const halved = projections.has(location) ? matrix.map((v, i) => i % 4 < 2 ? v / 2 : v) : matrix;
+        uniformMatrix4fv.call(this, location, transpose, halved);
     };
     gl.drawElements = function (mode, count, type, offset) {
         drawn = this.canvas;
