@@ -54,7 +54,7 @@ export async function openPage(browser, service, {width, height, touch = false, 
     await prepare(page);
     await page.goto(service.url + path);
     await page.evaluate(() => window.rqtViewer.ready);
-    return Object.assign(new View(), {page, context, problems, asked});
+    return Object.assign(new View(), {page, context, problems, asked, touch});
 }
 
 export class View {
@@ -126,6 +126,12 @@ export class View {
     lastAsked(word) {
         const url = this.asked.filter(u => u.pathname.includes(word)).at(-1);
         return url && {path: url.pathname + url.search, parameters: Object.fromEntries(url.searchParams)};
+    }
+
+    /** The camera and the options with which the page asked for what it shows, as SQL takes them. */
+    question() {
+        const {camera, f, ...options} = this.lastAsked('/view').parameters;
+        return {camera, format: f, options: JSON.stringify(options, (key, value) => key === 'max_triangles' ? Number(value) : value)};
     }
 
     async close() {

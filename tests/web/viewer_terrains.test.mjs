@@ -1,7 +1,7 @@
 // viewer_terrains.test.mjs - terrains of each kind in the page: no complaint, a picture, and the mesh that SQL gives.
 import assert from 'node:assert/strict';
 import {after, before, test} from 'node:test';
-import {DESKTOP, PHONE, keepingShots, launch, openPage} from './browser.mjs';
+import {DESKTOP, PHONE, SMALL, keepingShots, launch, openPage} from './browser.mjs';
 import {colours} from './picture.mjs';
 import {Service, TERRAINS, sql} from './serve.mjs';
 
@@ -20,17 +20,11 @@ async function open(terrain, size) {
     return view;
 }
 
-/** The camera and the options with which the page asked for what it shows. */
-function question(view) {
-    const {camera, f, ...options} = view.lastAsked('/view').parameters;
-    return {camera, format: f, options: JSON.stringify(options, (key, value) => key === 'max_triangles' ? Number(value) : value)};
-}
-
 for (const terrain of Object.keys(TERRAINS))
     for (const [size, viewport] of Object.entries({desktop: DESKTOP, phone: PHONE})) {
         const name = `${terrain} on a ${size}`;
         test(`${name}: a picture, its figures, and no complaint`, keepingShots(name, () => views, async () => {
-            const view = await open(terrain, viewport), state = await view.state(), {camera, options} = question(view);
+            const view = await open(terrain, viewport), state = await view.state(), {camera, options} = view.question();
             await view.shot(`${terrain}-${size}`);
             assert.equal(state.terrain, terrain);
             assert.deepEqual(JSON.parse(camera), state.camera, 'the camera that is told is the one that was asked with');
@@ -54,7 +48,7 @@ for (const terrain of Object.keys(TERRAINS))
 
 test('the mesh in the page is that of SQL, vertex by vertex and triangle by triangle', keepingShots('mesh', () => views, async () => {
     for (const terrain of Object.keys(TERRAINS)) {
-        const view = await open(terrain, DESKTOP), mesh = await view.mesh(), {camera, options} = question(view);
+        const view = await open(terrain, SMALL), mesh = await view.mesh(), {camera, options} = view.question();
         const rows = await sql('SELECT col, row, q FROM rqt_view(:camera, :terrain, :options) ORDER BY 1, 2', {camera, terrain, options});
         const order = Array.from(mesh.col.keys()).sort((a, b) => mesh.col[a] - mesh.col[b] || mesh.row[a] - mesh.row[b]);
         assert.deepEqual(order.map(v => [mesh.col[v], mesh.row[v], mesh.q[v]]), rows.map(r => [r.col, r.row, r.q]), terrain);
