@@ -70,7 +70,10 @@ export class View {
 
     /** Until nothing is under way: the mesh for this camera is there, and no vertex moves. */
     async settled() {
-        await this.page.evaluate(() => window.rqtViewer.settled());
+        const isSettled = await this.page.evaluate(patience => Promise.race([
+            window.rqtViewer.settled().then(() => true), new Promise(resolve => setTimeout(resolve, patience, false)),
+        ]), PATIENCE);
+        if (!isSettled) throw new Error(`the page does not settle: ${JSON.stringify(await this.state())}`);
     }
 
     /** Moves, and is there. */
@@ -78,6 +81,26 @@ export class View {
         await this.setCamera(camera);
         await this.settled();
         return this.state();
+    }
+
+    /** Until what `see` gives in the page, with an argument, is as `is` wants it; that. */
+    async until(see, is, argument) {
+        for (const end = Date.now() + PATIENCE; ;) {
+            const seen = await this.page.evaluate(see, argument);
+            if (is(seen)) return seen;
+            if (Date.now() > end) throw new Error(`in vain waited for ${is}: ${JSON.stringify(seen)}`);
+            await new Promise(resolve => setTimeout(resolve, 30));
+        }
+    }
+
+    /** The fragment of the address, when it says what the page shows: it is written a moment later. */
+    async fragment() {
+        const {camera, wires, ask} = await this.state();
+        return this.until(() => location.hash, hash => {
+            const kept = new URLSearchParams(hash.slice(1));
+            return kept.get('eye') === camera.eye.join() && Number(kept.get('yaw')) === camera.yaw && Number(kept.get('pitch')) === camera.pitch &&
+                kept.has('wires') === wires && (ask !== 'view' || Number(kept.get('tau')) === camera.tau);
+        });
     }
 
     /** The canvas alone, without what lies over it: a picture. */

@@ -21,7 +21,7 @@ const sentence = view => view.page.evaluate(() => {
     const problem = document.querySelector('#problem');
     return problem.checkVisibility() ? problem.querySelector('p').textContent : '';
 });
-const until = (view, is) => view.page.waitForFunction(`(${is})(document.querySelector('#problem').checkVisibility())`);
+const until = (view, is) => view.until(() => document.querySelector('#problem').checkVisibility(), is);
 /** A camera a little further on each time. */
 const camera = async (view, n) => {
     const {camera: {eye, yaw, pitch}} = await view.state();

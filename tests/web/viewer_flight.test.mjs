@@ -93,7 +93,7 @@ for (const terrain of ['degrees', 'metres'])
         assert.deepEqual(view.problems, []);
 
         // The picture at the end is the one that a page has which was never elsewhere.
-        const picture = await view.picture(), fragment = await view.page.evaluate(() => location.hash);
+        const picture = await view.picture(), fragment = await view.fragment();
         await view.close();
         const fresh = await open(terrain, {path: fragment});
         assert.equal(differingPixels(picture, await fresh.picture()), 0);
@@ -134,7 +134,7 @@ test('a geomorph has pictures half-way, no gap, and ends in the picture of a pag
         // At the new camera with the old mesh, then between the two, then with the new one.
         const between = pictures.filter(([fromFirst, fromLast]) => fromFirst > 0 && fromLast > 0);
         assert.ok(between.length >= 3, `${between.length} pictures between, of ${pictures.length}: ${JSON.stringify(pictures)}`);
-        const picture = await view.picture(), fragment = await view.page.evaluate(() => location.hash);
+        const picture = await view.picture(), fragment = await view.fragment();
         await view.close();
         const fresh = await open(terrain, {path: fragment});
         assert.equal(differingPixels(picture, await fresh.picture()), 0, terrain);
