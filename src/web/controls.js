@@ -3,7 +3,7 @@
 // One pointer drags: the left button or a finger turns, the right or middle button, or shift, pans. Two fingers pan and
 // pinch. A pointer that goes down and up at one place is a click.
 
-const STILL = 6, PROMPT = 500; // CSS pixels and milliseconds within which down and up are a click
+const STILL = 6; // CSS pixels within which down and up are a click
 
 export class Controls {
     /**
@@ -51,7 +51,7 @@ export class Controls {
         document.activeElement?.blur(); // keys move the camera now, and not the slider that was used last
         const at = this.pixelsOf(event);
         this.pointers.set(event.pointerId, at);
-        this.press = this.pointers.size === 1 && event.button === 0 ? {at, time: event.timeStamp} : null;
+        this.press = this.pointers.size === 1 && event.button === 0 ? at : null;
         this.kind = this.pointers.size > 1 || event.button !== 0 || event.shiftKey ? 'pan' : 'turn';
         this.spread = this.spreadNow();
         this.hooks.mode().end();
@@ -64,7 +64,7 @@ export class Controls {
         this.pointers.set(event.pointerId, this.pixelsOf(event));
         const now = this.middle();
         if (this.press) {
-            if (Math.hypot(now[0] - this.press.at[0], now[1] - this.press.at[1]) < STILL) return;
+            if (Math.hypot(now[0] - this.press[0], now[1] - this.press[1]) < STILL) return;
             this.press = null;
         }
         const mode = this.hooks.mode(), from = this.placeOf(before), to = this.placeOf(now);
@@ -83,8 +83,8 @@ export class Controls {
         if (this.pointers.size) {
             this.kind = 'turn';
             this.hooks.mode().begin(this.placeOf(this.middle()));
-        } else if (press && event.type === 'pointerup' && event.timeStamp - press.time < PROMPT) {
-            this.hooks.click(press.at);
+        } else if (press && event.type === 'pointerup') {
+            this.hooks.click(press);
         }
     }
 

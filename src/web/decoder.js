@@ -9,7 +9,7 @@ import {morphMeshes} from './morph.js';
 import {Place} from './place.js';
 import {decodeMesh} from './wire.js';
 
-const MOST_MORPHED = 400000; // vertices of both meshes: beyond, the picture would wait for the union longer than it moves
+const MOST_MORPHED = 150000; // vertices of both meshes: beyond, the picture would wait for the union longer than it moves
 
 let terrain = null;
 let last = null; // {mesh, exaggeration}: what is shown until the next answer

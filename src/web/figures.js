@@ -9,7 +9,7 @@ const allTriangles = ({width, height}) => 2 * (width - 1) * (height - 1);
 
 function share(shown, all) {
     const percent = 100 * shown / all;
-    return `${percent < 0.01 ? 'under 0.01' : plain(percent)} % of the full resolution's ${count(all)}`;
+    return `${percent < 0.01 ? 'under 0.01' : plain(percent)} % of the ${count(all)} of all samples`;
 }
 
 /** What the service proves of an answer, as a sentence; and does it prove anything? */
@@ -30,7 +30,7 @@ export function promiseOf({wish, told}) {
 export class Figures {
     constructor() {
         this.values = new Map();
-        for (const name of ['Vertices', 'Received', 'Answer', 'Decoding', 'Frame', 'Eye above ground', 'Eye at']) {
+        for (const name of ['Vertices', 'Received', 'Answer', 'Decoding', 'Frame', 'Above ground', 'Eye']) {
             const term = document.createElement('dt'), value = document.createElement('dd');
             term.textContent = name;
             value.textContent = '\u2013';
@@ -53,7 +53,7 @@ export class Figures {
         element('promise').classList.toggle('unproved', !promise.isProved);
         element('summary').textContent = `${count(triangleCount)} triangles, ${promise.short}`;
         this.set('Vertices', count(vertexCount));
-        this.set('Received', `${bytes(stage.bytes)}, ${plain(8 * stage.bytes / Math.max(1, vertexCount))} bits a vertex`);
+        this.set('Received', `${bytes(stage.bytes)}, ${bytes(Number(plain(stage.bytes / Math.max(1, vertexCount))))} a vertex`);
         this.set('Answer', milliseconds(stage.milliseconds.answer));
         this.set('Decoding', milliseconds(stage.milliseconds.decode));
     }
@@ -65,7 +65,7 @@ export class Figures {
     }
 
     showEye(clearance, place) {
-        this.set('Eye above ground', Number.isNaN(clearance) ? '\u2013' : metres(clearance));
-        this.set('Eye at', place);
+        this.set('Above ground', Number.isNaN(clearance) ? '\u2013' : metres(clearance));
+        this.set('Eye', place);
     }
 }

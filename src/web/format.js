@@ -9,7 +9,8 @@ export const count = value => grouped.format(value).replace(/,/g, '\u202f');
 export function plain(value) {
     if (!Number.isFinite(value)) return '\u2013';
     const size = Math.abs(value);
-    return size >= 100 ? count(Math.round(value)) : String(Number(value.toPrecision(size >= 1 ? 3 : 2)));
+    const text = size >= 100 ? count(Math.round(size)) : String(Number(size.toPrecision(size >= 1 ? 3 : 2)));
+    return value < 0 ? `\u2212${text}` : text;
 }
 
 export const metres = value =>
@@ -18,7 +19,10 @@ export const metres = value =>
 export const pixels = value => `${plain(value)}\u00a0px`;
 
 /** A height as a surveyor reads it: to the centimetre. */
-export const height = value => `${value.toFixed(2)}\u00a0m`;
+export function height(value) {
+    const [whole, part] = Math.abs(value).toFixed(2).split('.');
+    return `${value < 0 ? '\u2212' : ''}${count(Number(whole))}.${part}\u00a0m`;
+}
 
 export function bytes(value) {
     if (value < 1000) return `${value}\u00a0B`;
@@ -27,9 +31,10 @@ export function bytes(value) {
 
 export const milliseconds = value => `${plain(Math.max(value, 0.1))}\u00a0ms`;
 
-/** x and y of the CRS: degrees to a decimetre, or metres likewise. */
-export function place(x, y, isSpace) {
+/** x and y of the CRS: degrees with so many digits behind the point, or units to a tenth. */
+export function place(x, y, isSpace, digits) {
     if (!isSpace) return `${x.toFixed(1)}, ${y.toFixed(1)}`;
-    const degrees = (value, positive, negative) => `${Math.abs(value).toFixed(6)}\u00b0\u00a0${value < 0 ? negative : positive}`;
+    const degrees = (value, positive, negative) =>
+        `${Math.abs(value).toFixed(digits)}\u00b0\u00a0${value < 0 ? negative : positive}`;
     return `${degrees(y, 'N', 'S')}, ${degrees(x, 'E', 'W')}`;
 }

@@ -63,7 +63,7 @@ void main() {
     float sun = max(dot(n, normalize(vec3(-1.0, 1.0, 1.1))), 0.0);
     float sky = 0.5 + 0.5 * n.z;
     float west = max(dot(n, normalize(vec3(-1.0, -0.6, 0.6))), 0.0);
-    float shade = 0.16 + 0.24 * sky + 0.66 * sun + 0.16 * west;
+    float shade = 0.24 + 0.26 * sky + 0.54 * sun + 0.16 * west;
     // Errors keep their lightness, by which they are read.
     if (colouring == 1) shade = 0.62 + 0.44 * shade;
     vec3 lit = tint() * min(shade * 1.06, 1.25);

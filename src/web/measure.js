@@ -59,7 +59,7 @@ export class Measure {
         const height = await askHeight(this.hooks.terrain(), x, y);
         if (turn !== this.count) return;
         this.put('height', [x, y, height ?? z], height === null ? 'no data' : exactly(height));
-        this.tell(`<strong>${height === null ? 'No data' : exactly(height)}</strong> at ${placeText(x, y, this.hooks.scene().isSpace)}`);
+        this.tell(`<strong>${height === null ? 'No data' : exactly(height)}</strong> at ${placeText(x, y, this.hooks.scene().isSpace, 6)}`);
     }
 
     async clickProfile(place, turn) {
