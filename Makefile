@@ -238,7 +238,7 @@ check-layers: ## modules depend one way only; librqt.a and rqt.so mention only w
 	@$(MAKE) --no-print-directory -j2 products
 	@BUILD=$(BUILD) ./tests/check_layers.sh
 
-FORMATTED = $(wildcard src/*/*.[ch] src/geo/*.cpp ext/*.[ch] tests/*.[ch] tests/fuzz/*.[ch] tests/bench/*.[ch] tests/bench/peers/*.[ch])
+FORMATTED = $(wildcard src/*/*.[ch] src/geo/*.cpp ext/*.[ch] tests/*.[ch] tests/web/*.[ch] tests/fuzz/*.[ch] tests/bench/*.[ch] tests/bench/peers/*.[ch])
 .PHONY: format check-format
 format: ## lay the sources out (clang-format)
 	@./src/install-packages.sh format

@@ -111,7 +111,7 @@ for step in range(3):
     expected = one_row("SELECT mesh, token FROM rqt_view_answer(?1, 'increment', 'hills', ?2)", CAMERA, json.dumps({"previous": token, "cover": "terrain"}))
     equal("increment %d: rqt_view_mesh's bytes, and the token in a header" % step, (answer.status, answer.content_type, answer.body, answer.rqt_token),
           (200, "application/vnd.rqt.increment", *expected))
-    token = answer.rqt_token
+    token = answer.rqt_token or ""
     steps.append(len(answer.body))
 equal("which is packed already", ask(HILLS + "/view", {"camera": CAMERA, "f": "increment", "previous": ""}, headers={"Accept-Encoding": "gzip"}).content_encoding, None)
 equal("which are few where nothing changes", steps[1:], [48, 48])
@@ -423,7 +423,7 @@ thread.start()
 wait_until(lambda: b"rqt_requests_working 1" in service.ask("/metrics").body)
 service.process.send_signal(signal.SIGINT)
 thread.join()
-equal("what is under way at SIGINT is answered", (slow["verify"].status, slow["verify"].json()["max_error"]), (200, 0))
+equal("what is under way at SIGINT is answered", (slow["verify"].status, slow["verify"].json().get("max_error")), (200, 0))
 equal("and its connection is told that it was the last", slow["verify"].connection, "close")
 equal("then it ends", service.stop()[0], 0)
 try:

@@ -176,14 +176,14 @@ static rqt_status decode_status(const blob *b) {
 
 /* A mesh with errors, taken apart. */
 typedef struct sample {
-    answer fine;
     blob with;
-    size_t mesh, count, head, told, size; /* of bytes; vertices; of bits and what is before them; residuals */
-    uint8_t *plain;                       /* with room for more */
+    size_t mesh;                    /* its bytes without them */
+    size_t count, head, told, size; /* vertices; bytes before the list; residuals in it; bytes, plain */
+    size_t room;
+    uint8_t *plain; /* with room for a little more than the most */
 } sample;
 
 static void sample_take(sample *s, const answer *a) {
-    s->fine = *a;
     s->with = encode(a, NULL);
     s->mesh = s->with.size;
     s->count = a->patch.vertex_count;
@@ -191,7 +191,8 @@ static void sample_take(sample *s, const answer *a) {
     assert_int_equal(add(&s->with, &a->patch), RQT_OK);
     s->size = (size_t)ZSTD_getFrameContentSize(s->with.bytes + s->mesh, s->with.size - s->mesh);
     s->told = (s->size - s->head) / 2;
-    s->plain = calloc(s->size + 64, 1);
+    s->room = s->head + 2 * s->count + 64;
+    s->plain = calloc(s->room, 1);
     if (!s->plain) abort();
     assert_int_equal(ZSTD_decompress(s->plain, s->size, s->with.bytes + s->mesh, s->with.size - s->mesh), s->size);
 }
@@ -213,9 +214,9 @@ static void check_plain(const sample *s, const uint8_t *plain, size_t size, rqt_
 
 /* Each thing that FORMAT.md rules out, alone. */
 static void check_rules(const sample *s) {
-    uint8_t *p = malloc(s->size + 64);
+    uint8_t *p = malloc(s->room);
     if (!p) abort();
-#define AGAIN() memcpy(p, s->plain, s->size + 64)
+#define AGAIN() memcpy(p, s->plain, s->room)
     AGAIN();
     check_plain(s, p, s->size, RQT_OK, "as it was");
     for (size_t more = 1; more <= 2; more++) {
@@ -240,7 +241,7 @@ static void check_rules(const sample *s) {
         p[s->head + i] = p[s->head + s->told + i] = 0;
         if (i % 5 == 0) check_plain(s, p, s->size, RQT_CORRUPT, "a residual of 0");
     }
-    memset(p, 0xFF, s->size + 64);
+    memset(p, 0xFF, s->room);
     check_plain(s, p, s->head + 2 * s->count + 2, RQT_CORRUPT, "more than there are vertices");
 #undef AGAIN
     free(p);

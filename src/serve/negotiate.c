@@ -88,7 +88,7 @@ bool negotiate_coding(const char *accept_encoding, coding *c) {
     if (weight[CODING_IDENTITY] < 0) weight[CODING_IDENTITY] = 1; /* acceptable when nothing is said of it */
     /* Of equal ones zstd, which is quicker and smaller. */
     const coding packed = weight[CODING_ZSTD] >= weight[CODING_GZIP] ? CODING_ZSTD : CODING_GZIP;
-    if (weight[packed] > 0 && weight[packed] >= weight[CODING_IDENTITY]) *c = packed;
+    if (weight[packed] >= weight[CODING_IDENTITY]) *c = packed;
     return weight[*c] > 0;
 }
 

@@ -31,7 +31,7 @@ export function showLegend(colouring, heights, errors) {
     const [low, high] = colouring === 'relief' ? heights : errors;
     const ends = (first, middle, last) => [{at: 0, text: first}, {at: 0.5, text: middle}, {at: 1, text: last}];
     if (colouring === 'error') {
-        show('What leaving out a vertex would cost at most', [{stops: ERROR, share: 1}],
+        show('Error without the vertex, at most', [{stops: ERROR, share: 1}],
             ends(`under ${metres(low)}`, metres(Math.sqrt(low * high)), `over ${metres(high)}`));
     } else if (low < 0 && high > 0) {
         const shore = clamp(-low / (high - low), 0.25, 0.75);

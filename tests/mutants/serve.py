@@ -11,7 +11,7 @@ MUTANTS = [
     ("serve: infinite errors are numbers", "src/serve/answer.c", 'buffer_text(b, "null");', 'buffer_text(b, "0");', SERVE, "infinite errors null"),
     ("serve: a triangle of GeoJSON is open", "src/serve/meshes.c", "corner < 4; corner++", "corner < 3; corner++", SERVE, "range as GeoJSON"),
     ("serve: the last column of what is told is lost", "src/serve/meshes.c", "for (int i = ROW_COLUMNS; i < columns && count == 0; i++)", "for (int i = ROW_COLUMNS + 1; i < columns && count == 0; i++)", SERVE,
-     "says the eps"),
+     "JSON says the same"),
     ("serve: two databases of one name are mixed", "src/serve/documents.c", "if (!holds(collections,", "if (1 || !holds(collections,", SERVE, "of one name the first one's"),
     # what is asked
     ("serve: a parameter may come twice", "src/serve/target.c", "if (request_parameter(r, next->name)) {", "if (0) {", SERVE, "eps=1&eps=2"),
@@ -25,7 +25,7 @@ MUTANTS = [
     ("serve: a body is passed over", "src/serve/http.c", "if (!has_body(r)) return MHD_YES;", "return MHD_YES;", SERVE, "with one"),
     # negotiation and tags
     ("serve: weights do not count", "src/serve/negotiate.c", "e->weight = read_weight(p + 2);", "e->weight = 1000;", SERVE, "Accept-Encoding"),
-    ("serve: a weight of 0 is a yes", "src/serve/negotiate.c", "if (weight[packed] > 0 &&", "if (weight[packed] >= 0 &&", SERVE, "Accept-Encoding"),
+    ("serve: a weight of 0 is a yes", "src/serve/negotiate.c", "return weight[*c] > 0;", "return true;", SERVE, "nothing is acceptable"),
     ("serve: what is packed has the tag of what is not", "src/serve/endpoints.c", 'a->coding == CODING_IDENTITY ? "" : coding_name(a->coding)', '""', SERVE, "a tag of its own"),
     ("serve: a tag is not of the request", "src/serve/endpoints.c", "add_text(add_text(0xCBF29CE484222325u, RQT_VERSION), r->target)", "0xCBF29CE484222325u", SERVE, "a tag of its own"),
     ("serve: a tag does not know the change counter", "src/serve/database.c", "hash = add_to_hash(hash, header + HEADER_COUNTER, HEADER_BYTES - HEADER_COUNTER);", "", SERVE, "tag"),

@@ -5,6 +5,7 @@ import {mkdtempSync, readFileSync, rmSync} from 'node:fs';
 import {tmpdir} from 'node:os';
 import {dirname, join, resolve} from 'node:path';
 import {fileURLToPath} from 'node:url';
+import {Fold} from '../../src/web/checksum.js';
 
 const HERE = dirname(fileURLToPath(import.meta.url)), ROOT = join(HERE, '..', '..');
 const BUILD = resolve(ROOT, process.env.BUILD || 'build');
@@ -36,12 +37,14 @@ export function recordsOf(what) {
     return records;
 }
 
+let isMade = false;
+
 /**
- * What the C decoder makes of records: for each a mesh, or null where it says no. '0' forgets the mesh before, and has no answer.
+ * What the C decoder makes of records: for each a mesh, of a frame its content, or null where it says no. '0' forgets the mesh before, and has no answer.
  * @param {{what: string, bytes?: Uint8Array}[]} records
  */
 export function decodeInC(records) {
-    run('make', ['-s', `BUILD=${BUILD}`, join(BUILD, 'tests', 'web', 'decode')]);
+    isMade ||= Boolean(run('make', ['-s', `BUILD=${BUILD}`, join(BUILD, 'tests', 'web', 'decode')]));
     const input = [];
     for (const {what, bytes = new Uint8Array(0)} of records) {
         const head = Buffer.alloc(5);
@@ -56,11 +59,13 @@ export function decodeInC(records) {
         const bytes = Uint8Array.prototype.slice.call(answers, at, at += count * type.BYTES_PER_ELEMENT);
         return new type(bytes.buffer, bytes.byteOffset, count);
     };
-    const found = records.filter(({what}) => what !== '0').map(() => {
+    const found = records.filter(({what}) => what !== '0').map(({what}) => {
         if (number() !== 0) return null;
+        if (what === 'Z') return numbers(Uint8Array, number());
         const vertexCount = number(), triangleCount = number();
         const mesh = {vertexCount, triangleCount, col: numbers(Int32Array, vertexCount), row: numbers(Int32Array, vertexCount),
             q: numbers(Int32Array, vertexCount), triangles: numbers(Uint32Array, 3 * triangleCount)};
+        mesh.errors = number() ? numbers(Float64Array, vertexCount) : null;
         mesh.normals = number() ? numbers(Float32Array, 3 * vertexCount) : null;
         return mesh;
     });
@@ -82,6 +87,18 @@ export class Dice {
         h = Math.imul(h ^ h >>> 13, 0xC2B2AE35);
         return Math.floor(((h ^ h >>> 16) >>> 0) / 2 ** 32 * n);
     }
+}
+
+/** Sets the checksum at offset 8, so that a change is not found by it. */
+export function sign(bytes) {
+    bytes.fill(0, 8, 16);
+    const fold = new Fold(bytes.length), padded = new DataView(new ArrayBuffer(bytes.length + 8));
+    new Uint8Array(padded.buffer).set(bytes);
+    for (let i = 0; i < bytes.length; i += 8) fold.add(padded.getUint32(i + 4, true), padded.getUint32(i, true));
+    const {high, low} = fold.end(), view = new DataView(bytes.buffer, bytes.byteOffset);
+    view.setUint32(8, low, true);
+    view.setUint32(12, high, true);
+    return bytes;
 }
 
 /** Are two arrays of numbers equal? Quicker, and of fewer words where they are not, than a deep comparison. */
