@@ -30,13 +30,13 @@ async function trianglesOf(view, terrain, isDegrees) {
 
 const CAMERAS = {
     degrees: {eye: [-71.42, 44.12, 2600], yaw: 31, pitch: -14, fovy: 50, position: 'crs'},
-    metres: {yaw: 10, pitch: -65, fovy: 60, exaggeration: 2, position: 'crs'},
+    metres: {yaw: 10, pitch: -75, fovy: 30, exaggeration: 2, position: 'crs'},
 };
 
 for (const terrain of ['degrees', 'metres'])
     test(`30 clicks on ${terrain}: where the ray meets the mesh, and SQL's height there`, keepingShots(`pick ${terrain}`, () => views, async () => {
         const isDegrees = terrain === 'degrees', view = await open(terrain, SMALL);
-        const [box] = await sql('SELECT x0 + dx * (width - 1) / 2 AS x, y0 + dy * height AS y, max_z AS z FROM rqt_terrains WHERE name = :terrain', {terrain});
+        const [box] = await sql('SELECT x0 + dx * (width - 1) / 2 AS x, y0 + dy * height * 0.7 AS y, max_z AS z FROM rqt_terrains WHERE name = :terrain', {terrain});
         const {camera} = await view.see(isDegrees ? CAMERAS.degrees : {...CAMERAS.metres, eye: [box.x, box.y, 2 * box.z + 1000]});
         const triangles = await trianglesOf(view, terrain, isDegrees), {eye} = frameOf(camera, isDegrees);
         let hits = 0;
