@@ -32,7 +32,7 @@ export async function openPage(browser, service, {width, height, touch = false, 
     const context = await browser.newContext({viewport: {width, height}, hasTouch: touch, isMobile: touch, deviceScaleFactor: 1});
     const page = await context.newPage();
     page.setDefaultTimeout(PATIENCE);
-    const problems = [], asked = [];
+    const problems = [], asked = [], told = [];
     const origin = new URL(service.url).origin;
     page.on('console', message => {
         if (['error', 'warning', 'assert'].includes(message.type())) problems.push(`console: ${message.text()}`);
@@ -48,13 +48,14 @@ export async function openPage(browser, service, {width, height, touch = false, 
         if (why !== 'net::ERR_ABORTED') problems.push(`${request.url()}: ${why}`);
     });
     page.on('response', response => {
+        told.push({url: new URL(response.url()), headers: response.headers()});
         if (response.status() >= 400) problems.push(`${response.url()}: ${response.status()}`);
     });
     if (record) await page.addInitScript(recordFrames, {findGaps: findGaps.toString(), vanishingPoint: vanishingPoint.toString(), background: BACKGROUND, slow});
     await prepare(page);
     await page.goto(service.url + path);
     await page.evaluate(() => window.rqtViewer.ready);
-    return Object.assign(new View(), {page, context, problems, asked, touch});
+    return Object.assign(new View(), {page, context, problems, asked, told, touch});
 }
 
 export class View {
@@ -145,10 +146,11 @@ export class View {
         }));
     }
 
-    /** What the page last asked for with this word in the path: {path, parameters}. */
-    lastAsked(word) {
-        const url = this.asked.filter(u => u.pathname.includes(word)).at(-1);
-        return url && {path: url.pathname + url.search, parameters: Object.fromEntries(url.searchParams)};
+    /** What the page last asked for at an endpoint: {url, parameters}, and what it was last told there: {headers}. */
+    lastAsked(endpoint) {
+        const url = this.asked.filter(({pathname}) => pathname.endsWith(endpoint)).at(-1);
+        const told = this.told.filter(({url: {pathname}}) => pathname.endsWith(endpoint)).at(-1);
+        return {url: url.href, parameters: Object.fromEntries(url.searchParams), headers: told?.headers};
     }
 
     /** The camera and the options with which the page asked for what it shows, as SQL takes them. */
@@ -191,6 +193,12 @@ function recordFrames({findGaps, vanishingPoint, background, slow}) {
     const {clearColor, drawElements, getUniformLocation, uniformMatrix4fv, viewport} = gl, projections = new WeakSet(), copy = document.createElement('canvas');
     const request = window.requestAnimationFrame.bind(window), now = performance.now.bind(performance);
     let drawn = null;
+    let underWay = 0;
+    const fetch = window.fetch.bind(window);
+    window.fetch = (...question) => {
+        underWay++;
+        return fetch(...question).finally(() => underWay--);
+    };
     window.recordedFrames = [];
     window.withGaps = [];
     window.pictures = [];
@@ -229,7 +237,7 @@ function recordFrames({findGaps, vanishingPoint, background, slow}) {
         const camera = window.rqtViewer.state?.().camera;
         if (!camera) return;
         const found = gapsOf(shows, width, height, vanishing({...camera, width, height}));
-        window.recordedFrames.push({...found, camera});
+        window.recordedFrames.push({...found, camera, waits: underWay > 0});
         if (found.count && window.withGaps.length < 3) window.withGaps.push(copy.toDataURL());
         if (window.keepPictures) window.pictures.push(new Uint32Array(data.buffer));
     };

@@ -86,9 +86,11 @@ for (const terrain of ['degrees', 'metres'])
         }
         await view.settled();
         frames = frames.concat(await view.frames());
-        t.diagnostic(`${frames.length} frames`);
+        const waiting = frames.filter(f => f.waits).length;
+        t.diagnostic(`${frames.length} frames, ${waiting} of them between question and answer`);
         assert.deepEqual(withGaps(frames), []);
         assert.ok(frames.length >= 2 * cameras.length, `${frames.length} frames`);
+        assert.ok(waiting >= 10, `${waiting} frames between question and answer`);
         assert.ok(land >= 0.75 * cameras.length, `terrain at ${land} cameras`);
         assert.deepEqual(view.problems, []);
 
