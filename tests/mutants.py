@@ -11,6 +11,7 @@ whose objects are then mostly up to date. What was missed is said again at the e
 """
 import glob
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -35,7 +36,7 @@ def copy_tree(build, tree):
     for name in ("src", "ext", "sql", "tests", "examples", "Makefile"):
         (shutil.copytree if os.path.isdir(name) else shutil.copy2)(name, os.path.join(tree, name))
     shutil.copytree(build, os.path.join(tree, "build"),
-                    ignore=shutil.ignore_patterns("mutants", "sanitized", "threads", "coverage", "fuzz", "lint", "bench", "chart", "peers", "demo", "web-tests", "web-shots", "*.log"))
+                    ignore=shutil.ignore_patterns("mutants", "sanitized", "threads", "coverage", "fuzz", "lint", "bench", "chart", "peers", "demo", "web-shots", "*.log"))
 
 
 def run_mutant(tree, mutant):
@@ -58,7 +59,7 @@ def run_mutant(tree, mutant):
         made = subprocess.run(["make", "-s", "WARNINGS=", goal], cwd=tree, capture_output=True, text=True)
         if made.returncode:
             return "does not build:\n" + made.stderr[-1500:]
-        runner = ["node", "--test", "--test-reporter=tap"] if page else ["/usr/bin/python3"]
+        runner = ["node", "--test", "--test-reporter=tap", "--test-name-pattern=" + re.escape(test)] if page else ["/usr/bin/python3"]
         command = runner + ["tests/" + program] if script else ["build/tests/" + program]
         ran = subprocess.run(command, cwd=tree, capture_output=True, text=True, errors="replace",
                              timeout=300 if script else 120, env=environment)
