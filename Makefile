@@ -215,8 +215,9 @@ fuzz: ## every fuzzer for SECONDS=60 each, steered by libFuzzer, under ASan and 
 
 .PHONY: mutants
 mutants: ## break the code in one line, many times over: each time a named test must go red
-	@./src/install-packages.sh build test
-	@$(MAKE) --no-print-directory -j2 test-programs
+	@./src/install-packages.sh build test web browser
+	@$(MAKE) --no-print-directory -j2 products test-programs
+	@./tests/web/install.sh
 	@/usr/bin/python3 tests/mutants.py $(BUILD)
 
 DATA ?= tests/data
@@ -238,7 +239,7 @@ check-layers: ## modules depend one way only; librqt.a and rqt.so mention only w
 	@$(MAKE) --no-print-directory -j2 products
 	@BUILD=$(BUILD) ./tests/check_layers.sh
 
-FORMATTED = $(wildcard src/*/*.[ch] src/geo/*.cpp ext/*.[ch] tests/*.[ch] tests/fuzz/*.[ch] tests/bench/*.[ch] tests/bench/peers/*.[ch])
+FORMATTED = $(wildcard src/*/*.[ch] src/geo/*.cpp ext/*.[ch] tests/*.[ch] tests/web/*.[ch] tests/fuzz/*.[ch] tests/bench/*.[ch] tests/bench/peers/*.[ch])
 .PHONY: format check-format
 format: ## lay the sources out (clang-format)
 	@./src/install-packages.sh format

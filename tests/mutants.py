@@ -3,14 +3,15 @@
 
 WORD: only the mutants whose description holds it. A mutant, in tests/mutants/*.py, is (what it breaks, file, text, replacement,
 program, test): the first occurrence of the text is replaced in a copy of the tree, the program is built and run there, and the
-mutant is caught when it fails and names that test (or hangs). The program is one of build/tests, or a script tests/*.py, which
-runs with the mutant's command and extension. A text that is not found is a failure too: the list has to follow the code.
+mutant is caught when it fails and names that test (or hangs). The program is one of build/tests, or a script tests/*.py or
+tests/web/*.test.mjs, which runs with the mutant's command and extension. A text that is not found is a failure too: the list has to follow the code.
 
 As many workers as there are processors, each with a copy of the tree; mutants of one program follow each other in one of them,
 whose objects are then mostly up to date. What was missed is said again at the end.
 """
 import glob
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -35,7 +36,7 @@ def copy_tree(build, tree):
     for name in ("src", "ext", "sql", "tests", "examples", "Makefile"):
         (shutil.copytree if os.path.isdir(name) else shutil.copy2)(name, os.path.join(tree, name))
     shutil.copytree(build, os.path.join(tree, "build"),
-                    ignore=shutil.ignore_patterns("mutants", "sanitized", "threads", "coverage", "fuzz", "lint", "bench", "chart", "peers", "demo", "web-tests", "web-shots", "*.log"))
+                    ignore=shutil.ignore_patterns("mutants", "sanitized", "threads", "coverage", "fuzz", "lint", "bench", "chart", "peers", "demo", "web-shots", "*.log"))
 
 
 def run_mutant(tree, mutant):
@@ -52,16 +53,18 @@ def run_mutant(tree, mutant):
     with open(target, "w", encoding="utf-8") as f:
         f.write(text.replace(old, new, 1))
     try:
-        script = program.endswith(".py")
+        page = program.endswith(".mjs")
+        script = page or program.endswith(".py")
         goal = "products" if script else "build/tests/" + program
         made = subprocess.run(["make", "-s", "WARNINGS=", goal], cwd=tree, capture_output=True, text=True)
         if made.returncode:
             return "does not build:\n" + made.stderr[-1500:]
-        command = ["/usr/bin/python3", "tests/" + program] if script else ["build/tests/" + program]
+        runner = ["node", "--test", "--test-reporter=tap", "--test-name-pattern=" + re.escape(test)] if page else ["/usr/bin/python3"]
+        command = runner + ["tests/" + program] if script else ["build/tests/" + program]
         ran = subprocess.run(command, cwd=tree, capture_output=True, text=True, errors="replace",
                              timeout=300 if script else 120, env=environment)
         output = ran.stdout + ran.stderr
-        named = any(test in line and ("FAILED" in line or "ERROR" in line) for line in output.splitlines())
+        named = any(test in line and ("FAILED" in line or "ERROR" in line or line.startswith("not ok")) for line in output.splitlines())
         if ran.returncode != 0 and (named or ran.returncode < 0):
             return ""
         return "SURVIVED " + program + (" (red, but not " + test + ")" if ran.returncode else "")

@@ -19,7 +19,7 @@ s.import_terrain(BASE, s.write_grid(s.temp("feet.asc"), s.rough_grid(33, 33, 7),
 CLARKE = 'GEOGCS["NAD27",DATUM["North_American_Datum_1927",SPHEROID["Clarke 1866",6378206.4,294.978698213898]],PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]]'
 s.import_terrain(BASE, s.write_grid(s.temp("clarke.asc"), s.rough_grid(33, 33, 7), x0=-100, y0=40, cell=0.01, crs=CLARKE), name="clarke", block=4)
 db = s.connect(BASE)
-FORMATS = ("strip", "indexed", "rqt", "rqt+normals", "obj", "ply", "ply+normals", "wkb", "gpkg", "spatialite")
+FORMATS = ("strip", "indexed", "rqt", "rqt+normals", "obj", "ply", "ply+normals", "glb", "rqt+normals+errors", "wkb", "gpkg", "spatialite")
 FREE = ("obj", "ply", "wkb", "gpkg", "spatialite")  # of meshes whose vertices are no samples
 PART = "POLYGON((200 -200, 900 -300, 500 -800, 200 -200))"
 VIEW = json.dumps({"eye": [300, -700, 400], "yaw": 20, "pitch": -40, "fovy": 60, "width": 400, "height": 300, "tau": 3})

@@ -23,7 +23,7 @@ command -v node >/dev/null 2>&1 && command -v npm >/dev/null 2>&1 || without "no
 if ! cmp -s "$here/package-lock.json" "$packages/installed.json"; then
     cp "$here/package.json" "$here/package-lock.json" "$here/.npmrc" "$packages/"
     (cd "$packages" && npm ci --ignore-scripts --no-audit --no-fund >npm.log 2>&1) ||
-        without "npm cannot install three, fzstd and esbuild ($packages/npm.log)"
+        without "npm cannot install three and esbuild ($packages/npm.log)"
     cp "$here/package-lock.json" "$packages/installed.json"
 fi
 # Modules are looked for beside the packages, so that none need lie in the source tree.

@@ -67,6 +67,17 @@ export class Camera {
         return {x: dot(from, right) / (tangent * this.width / this.height), y: dot(from, up) / tangent, depth};
     }
 
+    /** Looks so that a point is at a place of the picture, as near to it as a camera without roll can. */
+    hold(point, [x, y]) {
+        const tangent = Math.tan(this.fovy / 2 * DEGREE), ray = unit([x * tangent * this.width / this.height, y * tangent, 1]);
+        const {east, north, up} = this.scene.axes(this.place), to = unit(subtract(point, this.eye));
+        const [right, above, ahead] = ray, rise = clamp(dot(to, up) / Math.hypot(above, ahead), -1, 1);
+        const pitch = Math.asin(rise) - Math.atan2(above, ahead);
+        const aside = Math.atan2(right, ahead * Math.cos(pitch) - above * Math.sin(pitch));
+        this.yaw = ((Math.atan2(dot(to, east), dot(to, north)) - aside) / DEGREE + 720) % 360;
+        this.pitch = clamp(pitch / DEGREE, -STEEPEST, STEEPEST);
+    }
+
     /** Degrees of the picture's height in which a landscape, or in portrait a portrait, looks natural. */
     static usualAngle(width, height) {
         return round(2 * Math.atan(Math.tan(20 * DEGREE) * clamp(height / width, 1, 1.7)) / DEGREE, 3);

@@ -4,6 +4,7 @@
 // pinch. A pointer that goes down and up at one place is a click.
 
 const STILL = 6; // CSS pixels within which down and up are a click
+const TWICE = 400; // milliseconds within which a second one is part of a double-click
 
 export class Controls {
     /**
@@ -11,7 +12,7 @@ export class Controls {
      * @param hooks {mode(): Orbit or Fly, click([px, py]), double(), changed()}
      */
     constructor(element, hooks) {
-        Object.assign(this, {element, hooks, pointers: new Map(), held: new Set(), press: null, spread: 0});
+        Object.assign(this, {element, hooks, pointers: new Map(), held: new Set(), press: null, lastClick: null, spread: 0});
         const on = (type, listener, options) => element.addEventListener(type, listener, options);
         on('pointerdown', event => this.down(event));
         on('pointermove', event => this.move(event));
@@ -19,6 +20,7 @@ export class Controls {
         on('pointercancel', event => this.up(event));
         on('wheel', event => this.wheel(event), {passive: false});
         on('contextmenu', event => event.preventDefault());
+        on('mousedown', event => event.preventDefault()); // the canvas takes the focus by Tab only
         on('dblclick', () => hooks.double());
         window.addEventListener('keydown', event => this.key(event, true));
         window.addEventListener('keyup', event => this.key(event, false));
@@ -84,7 +86,10 @@ export class Controls {
             this.kind = 'turn';
             this.hooks.mode().begin(this.placeOf(this.middle()));
         } else if (press && event.type === 'pointerup') {
-            this.hooks.click(press);
+            const last = this.lastClick, isSecond = last && event.timeStamp - last.time < TWICE &&
+                Math.hypot(press[0] - last.at[0], press[1] - last.at[1]) < STILL;
+            this.lastClick = {at: press, time: event.timeStamp};
+            if (!isSecond) this.hooks.click(press);
         }
     }
 

@@ -9,7 +9,7 @@ const allTriangles = ({width, height}) => 2 * (width - 1) * (height - 1);
 
 function share(shown, all) {
     const percent = 100 * shown / all;
-    return `${percent < 0.01 ? 'under 0.01' : plain(percent)} % of the full resolution's ${count(all)}`;
+    return `${percent < 0.01 ? '< 0.01' : plain(percent)} % of the full mesh\u2019s ${count(all)}`;
 }
 
 /** What the service proves of an answer, as a sentence; and does it prove anything? */
@@ -53,7 +53,7 @@ export class Figures {
         element('promise').classList.toggle('unproved', !promise.isProved);
         element('summary').textContent = `${count(triangleCount)} triangles, ${promise.short}`;
         this.set('Vertices', count(vertexCount));
-        this.set('Received', `${bytes(stage.bytes)}, ${bytes(Number(plain(stage.bytes / Math.max(1, vertexCount))))} a vertex`);
+        this.set('Received', `${bytes(stage.bytes)}, ${(stage.bytes / Math.max(1, vertexCount)).toFixed(1)} B/vertex`);
         this.set('Answer', milliseconds(stage.milliseconds.answer));
         this.set('Decoding', milliseconds(stage.milliseconds.decode));
     }

@@ -35,7 +35,7 @@ export class Fly {
 
     step(seconds, wish) {
         this.camera.turn(wish.yaw * 60 * seconds, wish.pitch * 45 * seconds);
-        this.move(wish.ahead * seconds, wish.right * seconds, wish.up * seconds, wish.fast ? 4 : 1);
+        this.move(wish.ahead * seconds, wish.right * seconds, wish.up * seconds / 2, wish.fast ? 3 : 1);
     }
 
     /** Moves along the line of sight, to the right and upward, in seconds at the speed of the place times `by`. */

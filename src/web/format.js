@@ -9,7 +9,8 @@ export const count = value => grouped.format(value).replace(/,/g, '\u202f');
 export function plain(value) {
     if (!Number.isFinite(value)) return '\u2013';
     const size = Math.abs(value);
-    return size >= 100 ? count(Math.round(value)) : String(Number(value.toPrecision(size >= 1 ? 3 : 2)));
+    const text = size >= 100 ? count(Math.round(size)) : String(Number(size.toPrecision(size >= 1 ? 3 : 2)));
+    return value < 0 ? `\u2212${text}` : text;
 }
 
 export const metres = value =>

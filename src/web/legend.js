@@ -1,11 +1,13 @@
 // legend.js - what the colours mean.
 
-import {ERROR, LAND, SEA, rampCss} from './palette.js';
 import {metres, plain} from './format.js';
+import {ERROR, LAND, SEA, rampCss} from './palette.js';
+import {clamp} from './scene.js';
 
 const legend = document.getElementById('legend');
 
-function show(ramps, ticks, note) {
+/** @param ramps [{stops, share}] from left to right @param ticks [{at: 0 to 1, text}] */
+function show(note, ramps, ticks) {
     legend.querySelector('.note').textContent = note;
     legend.querySelector('.ramps').replaceChildren(...ramps.map(({stops, share}) => {
         const ramp = document.createElement('div');
@@ -13,8 +15,10 @@ function show(ramps, ticks, note) {
         ramp.style.flex = String(share);
         return ramp;
     }));
-    legend.querySelector('.ticks').replaceChildren(...ticks.map(text => {
+    legend.querySelector('.ticks').replaceChildren(...ticks.map(({at, text}) => {
         const tick = document.createElement('span');
+        tick.style.left = `${100 * at}%`;
+        tick.style.transform = `translateX(${-100 * at}%)`;
         tick.textContent = text;
         return tick;
     }));
@@ -25,11 +29,15 @@ export function showLegend(colouring, heights, errors) {
     legend.hidden = colouring === 'plain';
     if (legend.hidden) return;
     const [low, high] = colouring === 'relief' ? heights : errors;
-    if (colouring === 'error')
-        show([{stops: ERROR, share: 1}], [`under ${metres(low)}`, metres(Math.sqrt(low * high)), `over ${metres(high)}`],
-            'What leaving out a vertex would cost at most');
-    else if (low < 0 && high > 0)
-        show([{stops: SEA, share: 0.5}, {stops: LAND, share: 0.5}], [plain(low), '0', metres(high)], 'Height');
-    else
-        show([{stops: low < 0 ? SEA : LAND, share: 1}], [plain(low), plain((low + high) / 2), metres(high)], 'Height');
+    const ends = (first, middle, last) => [{at: 0, text: first}, {at: 0.5, text: middle}, {at: 1, text: last}];
+    if (colouring === 'error') {
+        show('Error without the vertex, at most', [{stops: ERROR, share: 1}],
+            ends(`under ${metres(low)}`, metres(Math.sqrt(low * high)), `over ${metres(high)}`));
+    } else if (low < 0 && high > 0) {
+        const shore = clamp(-low / (high - low), 0.25, 0.75);
+        show('Height', [{stops: SEA, share: shore}, {stops: LAND, share: 1 - shore}],
+            [{at: 0, text: plain(low)}, {at: shore, text: '0'}, {at: 1, text: metres(high)}]);
+    } else {
+        show('Height', [{stops: low < 0 ? SEA : LAND, share: 1}], ends(plain(low), plain((low + high) / 2), metres(high)));
+    }
 }

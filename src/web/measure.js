@@ -87,6 +87,17 @@ export class Measure {
         this.put('read', row && row.slice(1), row ? exactly(row[3]) : '');
     }
 
+    /** Takes back the click that was last. */
+    cancel() {
+        this.count++;
+        if (this.ends.length === 1) {
+            this.clear();
+        } else {
+            this.put('height', null);
+            this.tell('');
+        }
+    }
+
     clear() {
         this.count++;
         this.ends = [];

@@ -98,13 +98,12 @@ class Union {
 
     /** The number of a lattice vertex, which is made if it is new. */
     enter(x, y) {
-        const e = this.table.find(x, y);
-        if (e >= 0) return this.table.index[e];
+        const v = this.table.indexOf(x, y, this.count);
+        if (v < this.count) return v;
         if (this.count === this.x.length) this.grow(2 * this.count);
-        const v = this.count++;
         this.x[v] = x;
         this.y[v] = y;
-        this.table.add(x, y, 0, v);
+        this.count++;
         return v;
     }
 

@@ -11,9 +11,10 @@ export class Orbit {
     /**
      * @param camera of camera.js
      * @param pick gives the point of the ground in the picture, or null
+     * @param furthest metres from the ground beyond which there is nothing to see
      */
-    constructor(camera, pick) {
-        Object.assign(this, {camera, pick, anchor: null, distance: 0});
+    constructor(camera, pick, furthest) {
+        Object.assign(this, {camera, pick, furthest, anchor: null, at: [0, 0], distance: 0});
     }
 
     /** The ground there, or where nothing is, a point as far away as the last one was. */
@@ -25,6 +26,7 @@ export class Orbit {
 
     begin(at) {
         this.anchor = this.pointAt(at);
+        this.at = at;
     }
 
     drag(kind, from, to) {
@@ -40,41 +42,42 @@ export class Orbit {
     /** Turns the eye about the anchor: about its upright, and up or down. */
     turn(around, upward) {
         const {camera, anchor} = this, {up} = camera.scene.axes(camera.scene.place(anchor));
-        const {forward, right} = camera.basis(), arm = subtract(camera.eye, anchor);
-        const height = Math.asin(clamp(dot(unit(arm), up), -1, 1));
-        const side = unit(cross(up, arm).map((c, i) => Math.abs(height) > 1.56 ? right[i] : c));
+        const arm = subtract(camera.eye, anchor), height = Math.asin(clamp(dot(unit(arm), up), -1, 1));
+        // Straight above the anchor the picture says what is aside.
+        const side = Math.abs(height) > 1.56 ? camera.basis().right : unit(cross(up, arm));
         const tilt = clamp(height + upward, Math.min(height, STEEP[0]), STEEP[1]) - height;
-        const turned = p => rotate(rotate(p, side, -tilt), up, around);
-        camera.set(add(anchor, turned(arm)), turned(forward));
+        camera.eye = add(anchor, rotate(rotate(arm, side, -tilt), up, around));
+        camera.hold(anchor, this.at);
     }
 
     /** Moves the eye so that the anchor is at a place of the picture. */
     pan(to) {
-        const {camera, anchor} = this, ray = camera.direction(...to), {forward} = camera.basis();
+        const {camera, anchor} = this, ray = camera.direction(...to), most = 4 * length(subtract(anchor, camera.eye));
         if (camera.scene.isSpace) {
             // On the sphere through the anchor, about the Earth's centre.
             const radius = length(anchor), half = dot(ray, camera.eye);
             const root = half * half - dot(camera.eye, camera.eye) + radius * radius;
             if (!(root > 0)) return;
             const a = unit(add(camera.eye, ray, -half - Math.sqrt(root))), b = unit(anchor), axis = cross(a, b);
-            if (!(length(axis) > 0)) return;
-            const angle = Math.atan2(length(axis), dot(a, b)), about = unit(axis);
-            if (angle * radius > 4 * length(subtract(anchor, camera.eye))) return;
-            camera.set(rotate(camera.eye, about, angle), rotate(forward, about, angle));
+            const angle = Math.atan2(length(axis), dot(a, b));
+            if (!(angle > 0 && angle * radius < most)) return;
+            camera.eye = rotate(camera.eye, unit(axis), angle);
         } else {
-            const t = (anchor[2] - camera.eye[2]) / ray[2];
-            if (!(t > 0)) return;
-            const by = subtract(anchor, add(camera.eye, ray, t));
+            const t = (anchor[2] - camera.eye[2]) / ray[2], by = subtract(anchor, add(camera.eye, ray, t));
             // Near the horizon a pixel is kilometres: there the ground slips.
-            if (length(by) > 4 * length(subtract(anchor, camera.eye))) return;
+            if (!(t > 0 && length(by) < most)) return;
             camera.eye = add(camera.eye, by);
         }
+        this.at = to;
+        camera.hold(anchor, to);
     }
 
     /** Goes nearer (factor below 1) to what is at a place of the picture, or away from it. */
     zoom(factor, at) {
-        const {camera} = this, point = this.anchor || this.pointAt(at), {forward} = camera.basis();
-        camera.set(add(point, scaled(subtract(camera.eye, point), factor)), forward);
+        const {camera} = this, point = this.anchor || this.pointAt(at), held = this.anchor ? this.at : at;
+        const arm = subtract(camera.eye, point), most = Math.max(1, this.furthest / length(arm));
+        camera.eye = add(point, scaled(arm, Math.min(factor, most)));
+        camera.hold(point, held);
     }
 
     /**
@@ -95,7 +98,7 @@ export class Orbit {
     }
 }
 
-/** Moves the eye by a vector that is level where it is, keeping its height: over a round Earth it goes round. */
+/** Moves the eye by a vector that is level where it is, keeping its height and pitch: over a round Earth it goes round. */
 export function moveAlongGround(camera, by, forward) {
     const {eye, scene} = camera;
     if (!scene.isSpace) {
@@ -104,6 +107,7 @@ export function moveAlongGround(camera, by, forward) {
     }
     const height = camera.place[2], axis = cross(unit(eye), by), angle = length(by) / length(eye);
     if (!(angle > 0)) return;
-    const [x, y] = scene.place(rotate(eye, unit(axis), angle));
+    const [x, y] = scene.place(rotate(eye, unit(axis), angle)), {pitch} = camera;
     camera.set(scene.point([x, y, height]), rotate(forward, unit(axis), angle));
+    camera.pitch = pitch;
 }

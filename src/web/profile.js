@@ -3,7 +3,7 @@
 import {height as exactly, metres, plain} from './format.js';
 
 const NAMESPACE = 'http://www.w3.org/2000/svg';
-const MARGIN = {left: 46, right: 10, top: 8, bottom: 22};
+const MARGIN = {left: 58, right: 10, top: 8, bottom: 22};
 
 function svg(name, attributes, text) {
     const node = document.createElementNS(NAMESPACE, name);
@@ -89,10 +89,11 @@ export class Profile {
         const y = z => MARGIN.top + (high - z) / (high - low) * (height - MARGIN.top - MARGIN.bottom);
         Object.assign(this, {x, y, width, height, length});
         const parts = [], foot = height - MARGIN.bottom;
-        for (const z of ticksOf(low, high, (height - 30) / 34)) {
+        ticksOf(low, high, (height - 30) / 34).forEach((z, i, all) => {
+            const label = i === all.length - 1 ? `${plain(z)}\u00a0m` : plain(z);
             parts.push(svg('line', {class: 'grid', x1: MARGIN.left, x2: width - MARGIN.right, y1: y(z), y2: y(z)}));
-            parts.push(svg('text', {x: MARGIN.left - 6, y: y(z) + 4, 'text-anchor': 'end'}, plain(z)));
-        }
+            parts.push(svg('text', {x: MARGIN.left - 6, y: y(z) + 4, 'text-anchor': 'end'}, label));
+        });
         const inKilometres = length >= 3000;
         const ticks = ticksOf(0, length, width / 110);
         ticks.forEach((distance, i) => {
@@ -102,7 +103,6 @@ export class Profile {
             parts.push(svg('text', {x: x(distance), y: height - 6, 'text-anchor': anchor},
                 isLast ? `${label}\u00a0${inKilometres ? 'km' : 'm'}` : label));
         });
-        parts.push(svg('text', {x: 2, y: MARGIN.top + 4}, 'm'));
         for (const run of runsOf(rows)) {
             const path = run.map(row => `${x(row[0]).toFixed(1)},${y(row[3]).toFixed(1)}`).join('L');
             const from = x(run[0][0]).toFixed(1), to = x(run[run.length - 1][0]).toFixed(1);

@@ -41,7 +41,22 @@ export class SampleTable {
         this.row[at] = row;
         this.q[at] = q;
         this.index[at] = index;
-        if (2 * this.count <= this.mask) return;
+        if (2 * this.count > this.mask) this.grow();
+    }
+
+    /** The index of an entry; when there is none it is added, with this index. */
+    indexOf(col, row, index) {
+        const at = this.slot(col, row);
+        if (this.col[at] !== -1) return this.index[at];
+        this.count++;
+        this.col[at] = col;
+        this.row[at] = row;
+        this.index[at] = index;
+        if (2 * this.count > this.mask) this.grow();
+        return index;
+    }
+
+    grow() {
         const old = {...this};
         this.take(2 * (this.mask + 1));
         for (let i = 0; i < old.col.length; i++) {

@@ -26,6 +26,7 @@ import {Stream} from './stream.js';
 import {TerrainLayer} from './terrain_layer.js';
 import {place as placeText} from './format.js';
 
+const HINT_MILLISECONDS = 10000;
 const CLEARANCE = 1.7; // metres: the eye does not get into the ground
 const USUAL = {ask: 'view', tau: 1, eps: 5, colour: 'relief', wires: false, morph: true, mode: 'orbit', tool: 'height', exaggeration: 1};
 
@@ -39,7 +40,7 @@ export class Viewer {
         this.isCapture = readFragment(location.hash).capture;
         this.picture = new Picture(element('picture'), this.isCapture, lost => this.lose(lost));
         this.layer = new TerrainLayer(this.picture.scene);
-        this.stream = new Stream(stage => this.show(stage), sentence => this.fail(sentence));
+        this.stream = new Stream(stage => this.show(stage), sentence => this.fail(sentence, true));
         this.marks = new Marks(element('pins'), this.picture.scene);
         this.profile = new Profile(element('profile'), {
             pointed: row => this.measure.point(row), closed: () => this.measure.clear(),
@@ -52,7 +53,7 @@ export class Viewer {
         this.panel = new Panel(settings => this.set(settings));
         this.panel.fill(terrains);
         this.controls = new Controls(element('picture'), {
-            mode: () => this.move(), click: at => this.click(at), double: () => this.lookAtAll(), changed: () => this.moved(),
+            mode: () => this.move(), click: at => this.click(at), double: () => this.double(), changed: () => this.moved(),
         });
         this.stage = null;
         this.frames = {last: 0, shown: 0, since: 0, cost: 0};
@@ -73,6 +74,7 @@ export class Viewer {
         element('help').addEventListener('click', event => event.target === element('help') && element('help').close());
         element('problem').querySelector('button').addEventListener('click', () => this.fail(''));
         matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.restyle());
+        setTimeout(() => element('hint').classList.add('gone'), HINT_MILLISECONDS);
         this.restyle();
     }
 
@@ -108,7 +110,8 @@ export class Viewer {
         // The same object for the same terrain: by this the worker knows it.
         terrain.forWorker ||= {isSpace: this.scene.isSpace, metre: this.scene.metre};
         this.camera = new Camera(this.scene);
-        this.orbit = new Orbit(this.camera, at => this.pointAt(at));
+        this.extent = extentOf(this.scene, terrain);
+        this.orbit = new Orbit(this.camera, at => this.pointAt(at), 4 * this.extent.radius);
         this.fly = new Fly(this.camera, () => this.clearance());
         this.glide = new Glide(this.camera);
         this.camera.exaggeration = this.settings.exaggeration;
@@ -139,7 +142,7 @@ export class Viewer {
         let done = 0;
         this.glide.begin(t => {
             if (isOrbit) {
-                this.orbit.anchor = anchor;
+                Object.assign(this.orbit, {anchor, at: [0, 0]});
                 this.orbit.turn((t - done) * yaw * Math.PI / 180, 0);
                 this.orbit.end();
                 if (t === 1) this.camera.yaw = 0;
@@ -248,7 +251,14 @@ export class Viewer {
     click(pixels) {
         const place = this.placeAt(pixels);
         element('hint').classList.add('gone');
+        this.fail('');
         if (place) this.measure.click(place, this.settings.tool);
+    }
+
+    /** The first click of the two was none. */
+    double() {
+        this.measure.cancel();
+        this.lookAtAll();
     }
 
     // ------------------------------------------------------------------------------------------------- the meshes
@@ -273,12 +283,14 @@ export class Viewer {
         this.figures.showStage(stage, this.terrain);
         element('bare').href = stage.wish.path;
         this.paint();
-        this.fail('');
+        if (this.isMeshMissing) this.fail('');
         this.redraw();
         while (this.layer.isMoving) await new Promise(resolve => requestAnimationFrame(resolve));
     }
 
-    fail(sentence) {
+    /** Says what is wrong; '': nothing is. What is said of a mesh that does not come goes when one does. */
+    fail(sentence, isMeshMissing = false) {
+        this.isMeshMissing = isMeshMissing;
         element('problem').hidden = !sentence;
         element('problem').querySelector('p').textContent = sentence;
     }
@@ -311,12 +323,11 @@ export class Viewer {
     }
 
     draw(now) {
-        const clearance = this.keepAboveGround(), started = performance.now(), {frames, camera, terrain} = this;
-        const [x0, y0, x1, y1] = terrain.bbox, corner = this.scene.point([x0, y0, terrain.terrain.min_z]);
-        const centre = this.scene.point([(x0 + x1) / 2, (y0 + y1) / 2, terrain.terrain.max_z]);
-        const radius = this.scene.isSpace && x1 - x0 > 60 ? 1.3e7 : length(subtract(corner, centre)) * 1.1 + this.heights()[1];
-        this.layer.uniforms.hazeDistance.value = radius * 3;
-        if (!this.isLost) this.picture.draw(camera, Number.isNaN(clearance) ? radius : clearance, {centre, radius});
+        const clearance = this.keepAboveGround(), started = performance.now(), {frames, camera, extent} = this;
+        // It is where its JSON and the address say, to the last bit: both show the same picture.
+        camera.read(camera.json(this.settings.tau));
+        this.layer.uniforms.hazeDistance.value = extent.radius * 3;
+        if (!this.isLost) this.picture.draw(camera, Number.isNaN(clearance) ? extent.radius : clearance, extent);
         frames.cost = performance.now() - started;
         this.stream.want(this.wish());
         const {clientWidth, clientHeight} = element('picture');
@@ -401,4 +412,12 @@ function rangeOf(errors) {
     const sorted = errors.filter(error => error > 0 && error < Infinity).sort(), {length: many} = sorted;
     const low = sorted[Math.floor(many * 0.02)], high = sorted[Math.floor(many * 0.98)];
     return low < high ? [low, high] : [0.1, 1];
+}
+
+/** A ball around a terrain, at whatever exaggeration. */
+function extentOf(scene, {bbox: [x0, y0, x1, y1], terrain: {min_z: lowest, max_z: highest}}) {
+    const centre = scene.point([(x0 + x1) / 2, (y0 + y1) / 2, 0]), deepest = 10 * Math.max(Math.abs(lowest), Math.abs(highest));
+    // Of more than a sixth of the Earth, all of it.
+    const isEarth = scene.isSpace && (x1 - x0 > 60 || y1 - y0 > 60);
+    return {centre, radius: isEarth ? 1.3e7 : length(subtract(scene.point([x0, y0, 0]), centre)) * 1.2 + deepest};
 }

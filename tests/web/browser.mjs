@@ -32,7 +32,7 @@ export async function openPage(browser, service, {width, height, touch = false, 
     const context = await browser.newContext({viewport: {width, height}, hasTouch: touch, isMobile: touch, deviceScaleFactor: 1});
     const page = await context.newPage();
     page.setDefaultTimeout(PATIENCE);
-    const problems = [], asked = [];
+    const problems = [], asked = [], told = [];
     const origin = new URL(service.url).origin;
     page.on('console', message => {
         if (['error', 'warning', 'assert'].includes(message.type())) problems.push(`console: ${message.text()}`);
@@ -48,13 +48,14 @@ export async function openPage(browser, service, {width, height, touch = false, 
         if (why !== 'net::ERR_ABORTED') problems.push(`${request.url()}: ${why}`);
     });
     page.on('response', response => {
+        told.push({url: new URL(response.url()), headers: response.headers()});
         if (response.status() >= 400) problems.push(`${response.url()}: ${response.status()}`);
     });
     if (record) await page.addInitScript(recordFrames, {findGaps: findGaps.toString(), vanishingPoint: vanishingPoint.toString(), background: BACKGROUND, slow});
     await prepare(page);
     await page.goto(service.url + path);
     await page.evaluate(() => window.rqtViewer.ready);
-    return Object.assign(new View(), {page, context, problems, asked});
+    return Object.assign(new View(), {page, context, problems, asked, told, touch});
 }
 
 export class View {
@@ -70,7 +71,10 @@ export class View {
 
     /** Until nothing is under way: the mesh for this camera is there, and no vertex moves. */
     async settled() {
-        await this.page.evaluate(() => window.rqtViewer.settled());
+        const isSettled = await this.page.evaluate(patience => Promise.race([
+            window.rqtViewer.settled().then(() => true), new Promise(resolve => setTimeout(resolve, patience, false)),
+        ]), PATIENCE);
+        if (!isSettled) throw new Error(`the page does not settle: ${JSON.stringify(await this.state())}`);
     }
 
     /** Moves, and is there. */
@@ -78,6 +82,26 @@ export class View {
         await this.setCamera(camera);
         await this.settled();
         return this.state();
+    }
+
+    /** Until what `see` gives in the page, with an argument, is as `is` wants it; that. */
+    async until(see, is, argument) {
+        for (const end = Date.now() + PATIENCE; ;) {
+            const seen = await this.page.evaluate(see, argument);
+            if (is(seen)) return seen;
+            if (Date.now() > end) throw new Error(`in vain waited for ${is}: ${JSON.stringify(seen)}`);
+            await new Promise(resolve => setTimeout(resolve, 30));
+        }
+    }
+
+    /** The fragment of the address, when it says what the page shows: it is written a moment later. */
+    async fragment() {
+        const {camera, wires, ask} = await this.state();
+        return this.until(() => location.hash, hash => {
+            const kept = new URLSearchParams(hash.slice(1));
+            return kept.get('eye') === camera.eye.join() && Number(kept.get('yaw')) === camera.yaw && Number(kept.get('pitch')) === camera.pitch &&
+                kept.has('wires') === wires && (ask !== 'view' || Number(kept.get('tau')) === camera.tau);
+        });
     }
 
     /** The canvas alone, without what lies over it: a picture. */
@@ -122,10 +146,17 @@ export class View {
         }));
     }
 
-    /** What the page last asked for with this word in the path: {path, parameters}. */
-    lastAsked(word) {
-        const url = this.asked.filter(u => u.pathname.includes(word)).at(-1);
-        return url && {path: url.pathname + url.search, parameters: Object.fromEntries(url.searchParams)};
+    /** What the page last asked for at an endpoint: {url, parameters}, and what it was last told there: {headers}. */
+    lastAsked(endpoint) {
+        const url = this.asked.filter(({pathname}) => pathname.endsWith(endpoint)).at(-1);
+        const told = this.told.filter(({url: {pathname}}) => pathname.endsWith(endpoint)).at(-1);
+        return {url: url.href, parameters: Object.fromEntries(url.searchParams), headers: told?.headers};
+    }
+
+    /** The camera and the options with which the page asked for what it shows, as SQL takes them. */
+    question() {
+        const {camera, f, ...options} = this.lastAsked('/view').parameters;
+        return {camera, format: f, options: JSON.stringify(options, (key, value) => key === 'max_triangles' ? Number(value) : value)};
     }
 
     async close() {
@@ -150,20 +181,42 @@ export function keepingShots(name, views, body) {
  * In the page, before its own scripts: paints the background in a colour of its own and reads the canvas after each frame,
  * within the same task, as it will be shown. A pixel with a share of that colour counts as background: edges are smoothed.
  *
+ * The software that stands in for a graphics card cuts triangles off at the picture's border, each for itself: the two sides
+ * of an edge across the border then differ by a subpixel, and now and then the background shines through. Graphics cards
+ * have a guard band, in which nothing is cut off; here a viewport twice as large under half the projection is one.
+ *
  * window.leaveOut = n leaves the n-th triangle out of what is drawn.
  */
 function recordFrames({findGaps, vanishingPoint, background, slow}) {
     const make = text => new Function(`return (${text})`)();
     const gapsOf = make(findGaps), vanishing = make(vanishingPoint), gl = WebGL2RenderingContext.prototype;
-    const {clearColor, drawElements} = gl, copy = document.createElement('canvas');
+    const {clearColor, drawElements, getUniformLocation, uniformMatrix4fv, viewport} = gl, projections = new WeakSet(), copy = document.createElement('canvas');
     const request = window.requestAnimationFrame.bind(window), now = performance.now.bind(performance);
     let drawn = null;
+    let underWay = 0;
+    const fetch = window.fetch.bind(window);
+    window.fetch = (...question) => {
+        underWay++;
+        return fetch(...question).finally(() => underWay--);
+    };
     window.recordedFrames = [];
     window.withGaps = [];
     window.pictures = [];
     performance.now = () => now() / slow;
     gl.clearColor = function () {
         clearColor.call(this, ...background, 1);
+    };
+    gl.viewport = function (x, y, width, height) {
+        viewport.call(this, x - width / 2, y - height / 2, 2 * width, 2 * height);
+    };
+    gl.getUniformLocation = function (program, name) {
+        const location = getUniformLocation.call(this, program, name);
+        if (location && name === 'projectionMatrix') projections.add(location);
+        return location;
+    };
+    gl.uniformMatrix4fv = function (location, transpose, matrix) {
+        const halved = projections.has(location) ? matrix.map((v, i) => i % 4 < 2 ? v / 2 : v) : matrix;
+        uniformMatrix4fv.call(this, location, transpose, halved);
     };
     gl.drawElements = function (mode, count, type, offset) {
         drawn = this.canvas;
@@ -184,7 +237,7 @@ function recordFrames({findGaps, vanishingPoint, background, slow}) {
         const camera = window.rqtViewer.state?.().camera;
         if (!camera) return;
         const found = gapsOf(shows, width, height, vanishing({...camera, width, height}));
-        window.recordedFrames.push({...found, camera});
+        window.recordedFrames.push({...found, camera, waits: underWay > 0});
         if (found.count && window.withGaps.length < 3) window.withGaps.push(copy.toDataURL());
         if (window.keepPictures) window.pictures.push(new Uint32Array(data.buffer));
     };

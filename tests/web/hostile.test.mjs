@@ -7,6 +7,8 @@ import {decodeMesh} from '../../src/web/wire.js';
 import {frameOf, inflate} from '../../src/web/zstd.js';
 import {decodeInC, Dice, isSame, recordsOf, sign} from './oracle.mjs';
 
+Error.stackTraceLimit = 2; // they are made by the thousand
+
 const dice = new Dice(20261126);
 console.log(`RQT_SEED=${dice.seed}`);
 
@@ -76,8 +78,8 @@ function spoil(bytes) {
 }
 
 /**
- * libzstd looks at the last symbol of some Huffman streams less closely (1.5.4: HUF_decodeLastSymbolX2), so it takes a few
- * damaged frames that zstd.js does not. All else is the same.
+ * libzstd does not look where some Huffman streams end (1.5.4: its fast loops for four of them, and the last symbol of codes
+ * for two letters), so it takes a few damaged frames that zstd.js does not. All else is the same.
  */
 const DAMAGED = 'the compressed bytes are not a zstd frame, or damaged';
 
@@ -171,7 +173,7 @@ test('2000 spoiled frames: what libzstd takes comes out the same, and nothing el
     assert.ok(taken > 50 && stricter < 40, `${taken} ${stricter}`);
 });
 
-test('20 bytes that stand for matches of 4 GB are refused at once', () => {
+test('24 bytes that stand for matches of 4 GB are refused at once', () => {
     // One literal; 32,000 sequences by tables of one symbol each: a match of 65,539 to 131,074 bytes, no literals, the offset before.
     const block = Uint8Array.of(0x08, 0x61, 0xFF, 0x00, 0x00, 0x54, 0x00, 0x00, 0x34, 0xFF, 0xFF, 0x01), head = block.length << 3 | 2 << 1 | 1;
     const bytes = Uint8Array.of(0x28, 0xB5, 0x2F, 0xFD, 0xA0, 0x00, 0x00, 0x02, 0x00, head, head >> 8, head >> 16, ...block);
@@ -181,9 +183,9 @@ test('20 bytes that stand for matches of 4 GB are refused at once', () => {
     assert.equal(decodeInC([{what: 'Z', bytes}])[0], null);
 });
 
-test('3000 spoiled increments: the C decoder\'s answer', () => {
+test('1000 spoiled increments: the C decoder\'s answer', () => {
     const first = records.filter(({what}) => what === 'I');
-    const cases = Array.from({length: 3000}, () => {
+    const cases = Array.from({length: 1000}, () => {
         const {bytes} = first[dice.below(first.length)], way = dice.below(4), at = 48 + 80 + new DataView(bytes.buffer, bytes.byteOffset).getUint32(40, true);
         if (way === 0) return sign(change(bytes, 16));
         if (way === 1) return sign(change(bytes, at));

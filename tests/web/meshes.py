@@ -1,8 +1,8 @@
 #!/usr/bin/python3
 """meshes.py OUT WHAT - meshes of terrains as the bytes that SQL gives, for the tests of src/web.
 
-OUT holds records: 1 byte what ('M' a mesh in wire format, 'D' an increment of rqt_delta on the one before, 'I' an increment of a view, 'Z' a zstd
-frame, 'P' what the one before stands for, 'J' JSON), 4 bytes each the sizes of name and bytes, the name, the bytes.
+OUT holds records: 1 byte what ('M' a mesh in wire format, 'D' an increment of rqt_delta on the one before, 'I' an increment of a view, 'X' the
+mesh before in format indexed, 'Z' a zstd frame, 'P' what the one before stands for, 'J' JSON), 4 bytes each the sizes of name and bytes, the name, the bytes.
 """
 import ctypes
 import ctypes.util
@@ -58,11 +58,12 @@ def wire():
         for extra in ("normals", "errors", "normals+errors"):
             put("M", "%s %s" % (name, extra), one(db, "SELECT rqt_mesh(NULL, 4, ?)", "rqt+" + extra))
         if width > 30:
-            for eps in (0, 2, 40):
-                put("M", name + " tol", one(db, "SELECT rqt_mesh(NULL, ?, 'rqt', NULL, '{\"outline\":\"tol\"}')", eps))
-    for file, block in (("glarus_1arc_native_161.tif", 5), ("glarus_alpine_25m_161.tif", 7), ("SainteHelens.dem", 7), ("N42E001.hgt.zip", 7), ("N41E001.hgt.zip", 8)):
+            for eps in (2, 40):
+                for what, form in (("M", "rqt"), ("X", "indexed")):
+                    put(what, "%s tol %d" % (name, eps), one(db, "SELECT rqt_mesh(NULL, ?, ?, NULL, '{\"outline\":\"tol\"}')", eps, form))
+    for file, block in (("glarus_1arc_native_161.tif", 5), ("glarus_alpine_25m_161.tif", 7), ("SainteHelens.dem", 7), ("N42E001.hgt.zip", 8)):
         db = terrain(file.split(".")[0], os.path.join(s.DATA, file), block=block)
-        for eps in (0, 5, 50) if not file.startswith("N4") else (5, 50):
+        for eps in (0, 5, 50) if not file.startswith("N4") else (10, 50):
             put("M", "%s eps %d" % (file, eps), one(db, "SELECT rqt_mesh(NULL, ?, 'rqt')", eps))
         x0, y0, dx, dy, width, height, top = one(db, "SELECT x0, y0, dx, dy, width, height, max_z FROM rqt_terrains")
         for n in range(4):
@@ -72,11 +73,11 @@ def wire():
 
 def views():
     """Cameras one after the other: increments from the first to the last, and after each the same mesh in the formats rqt and indexed."""
-    for name, width, height, voids, block, options in (("plain", 129, 129, 0, 4, {}), ("clamped", 130, 97, 20, 4, {}), ("void", 70, 70, 400, 3, {})):
+    for name, width, height, voids, block, options in (("plain", 65, 65, 0, 4, {}), ("clamped", 90, 67, 20, 4, {"cover": "terrain"}), ("void", 70, 70, 400, 3, {})):
         db = grid_terrain(name, s.rough_grid(width, height, 7, voids), cell=10, block=block)
         token = ""
         for n in range(20):
-            view = camera(300 + 40 * n, -700 + 30 * n, 400 - 10 * n, yaw=20 + 9 * n, pitch=-40 + n, tau=2 if n < 10 else 4)
+            view = camera(200 + 20 * n, -500 + 20 * n, 400 - 10 * n, yaw=20 + 9 * n, pitch=-40 + n, tau=2 if n < 10 else 4)
             given = json.dumps(dict(options, previous=token))
             blob, after = (one(db, "SELECT rqt_view_mesh(?, ?, ?, ?)", view, what, name, given) for what in ("increment", "rqt"))
             put("I", "%s %d" % (name, n), blob)

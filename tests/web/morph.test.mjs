@@ -64,7 +64,7 @@ function isNearEnd({width, height, K}, x, y) {
     return width - 1 < side && x + far > width - 1 || height - 1 < side && y + far > height - 1;
 }
 
-test('t = 0 is a\'s surface and t = 1 b\'s, at every sample; between them each is mixed with the other', () => {
+test('F35_a_geomorph_is_continuous_at_both_ends: t = 0 is a\'s surface and t = 1 b\'s, at every sample; between them each is mixed with the other', () => {
     const pairs = forPairs((name, a, b, union, exact) => {
         if (isClamped(exact)) return;
         const before = surfaceOf(a.mesh, a.mesh.q).heights, after = surfaceOf(b.mesh, b.mesh.q).heights;

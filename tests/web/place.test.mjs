@@ -12,7 +12,7 @@ for (let i = 0; i < records.length; i += 2)
 
 const distance = (a, b) => Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
 
-test('vertices are where SQL puts them, in double and as float32 about an origin', () => {
+test('F34_float32_far_from_the_origin: vertices are where SQL puts them, in double and as float32 about an origin', () => {
     for (const {name, lonlat, mesh, rows} of terrains) {
         const place = new Place({lonlat}), expected = new Map(rows.map(([col, row, ...point]) => [row * mesh.width + col, point]));
         const origin = expected.get(0), local = place.positionsOf(mesh, origin);

@@ -1,6 +1,6 @@
 #!/bin/bash
-# run.sh [FILE...] - the tests of the page: installs what package-lock.json names into build/web-tests, runs node's test
-# runner over tests/web/*.test.mjs (or over FILEs) and ends with `N passed, N failed`.
+# run.sh [FILE...] - the tests of the page: runs node's test runner over tests/web/*.test.mjs (or over FILEs) and ends with
+# `N passed, N failed`.
 #
 # What the tests draw is in build/web-shots, that of failed tests under its test's name; it is listed at the end.
 set -u
@@ -9,17 +9,7 @@ packages=build/web-tests
 export WEB_SHOTS=$PWD/build/web-shots
 mkdir -p "$packages" && rm -rf "$WEB_SHOTS" && mkdir -p "$WEB_SHOTS"
 
-if ! cmp -s tests/web/package-lock.json "$packages/installed.json"; then
-    cp tests/web/package.json tests/web/package-lock.json tests/web/.npmrc "$packages/"
-    if ! (cd "$packages" && npm ci --ignore-scripts --no-audit --no-fund >npm.log 2>&1); then
-        cat "$packages/npm.log"
-        echo "tests/web/run.sh: npm could not install playwright-core and gltf-validator"
-        echo "0 passed, 1 failed"
-        exit 1
-    fi
-    cp tests/web/package-lock.json "$packages/installed.json"
-fi
-
+./tests/web/install.sh || { echo "0 passed, 1 failed"; exit 1; }
 [ $# != 0 ] || set -- tests/web/*.test.mjs
 node --test --test-reporter=spec --test-reporter-destination=stdout --test-reporter=tap \
     --test-reporter-destination="$packages/results.tap" "$@"

@@ -22,8 +22,8 @@ async function open(terrain = 'metres', options = {}) {
 }
 
 /** Until the page's own account of itself is as `is` wants it; then settled. */
-async function until(view, is, argument) {
-    await view.page.waitForFunction(`(${is})({...window.rqtViewer.state().settings, ...window.rqtViewer.state()}, ${JSON.stringify(argument ?? null)})`);
+async function until(view, is) {
+    await view.until(() => ({...window.rqtViewer.state().settings, ...window.rqtViewer.state()}), is);
     await view.settled();
     return view.state();
 }
@@ -53,7 +53,7 @@ test('sliders change the mesh, by the arrow keys', keepingShots('sliders', () =>
     let before = await view.state();
     await view.page.focus('#tau');
     for (let i = 0; i < 3; i++) await view.page.keyboard.press('ArrowRight');
-    let now = await until(view, (s, tau) => s.camera.tau > tau, before.camera.tau);
+    let now = await until(view, s => s.camera.tau > before.camera.tau);
     assert.ok(now.triangles < before.triangles, `${now.triangles} at ${now.camera.tau}, ${before.triangles} at ${before.camera.tau}`);
     assert.equal(JSON.parse(view.lastAsked('/view').parameters.camera).tau, now.camera.tau);
     await view.page.focus('#picture');
@@ -61,7 +61,7 @@ test('sliders change the mesh, by the arrow keys', keepingShots('sliders', () =>
     before = await until(view, s => s.ask === 'range');
     await view.page.focus('#eps');
     for (let i = 0; i < 3; i++) await view.page.keyboard.press('ArrowRight');
-    now = await until(view, (s, eps) => s.eps > eps, before.eps);
+    now = await until(view, s => s.eps > before.eps);
     assert.ok(now.triangles < before.triangles, `${now.triangles} at ${now.eps} m, ${before.triangles} at ${before.eps} m`);
     assert.equal(Number(view.lastAsked('/range').parameters.eps), now.eps);
     const picture = await view.picture();
@@ -95,7 +95,7 @@ test('keys fly, colour, draw edges and help', keepingShots('keys', () => views, 
         ['l', (a, b) => a.yaw !== b.yaw], ['i', (a, b) => b.pitch > a.pitch]]) {
         const {camera: from} = await view.state();
         await keyboard.down(key);
-        await view.page.waitForFunction(`(${moves})(${JSON.stringify(from)}, window.rqtViewer.state().camera)`);
+        await view.until(() => window.rqtViewer.state().camera, camera => moves(from, camera));
         await keyboard.up(key);
     }
     await view.settled();
@@ -118,9 +118,9 @@ test('an address keeps a view: loaded again it is the same picture', keepingShot
     await view.page.keyboard.press('m');
     await view.settled();
     await view.shot('address');
-    const [picture, state, address] = [await view.picture(), await view.state(), await view.page.evaluate(() => location.href)];
+    const [picture, state, path] = [await view.picture(), await view.state(), await view.fragment()];
     await view.close();
-    const again = await open('', {path: address.slice(service.url.length)}), now = await again.state();
+    const again = await open('', {path}), now = await again.state();
     for (const key of ['terrain', 'camera', 'triangles', 'achievedTau', 'guaranteed']) assert.deepEqual(now[key], state[key], key);
     assert.equal(differingPixels(picture, await again.picture()), 0);
     await again.close();
@@ -185,18 +185,20 @@ function contrasts() {
     return found;
 }
 
-for (const scheme of ['light', 'dark'])
-    test(`contrast: every text can be read, ${scheme}`, keepingShots(`contrast ${scheme}`, () => views, async () => {
-        for (const size of [DESKTOP, PHONE]) {
-            const view = await open('metres', size);
+for (const [name, size] of Object.entries({desktop: DESKTOP, phone: PHONE}))
+    test(`contrast: every text can be read, in the light and in the dark, on a ${name}`, keepingShots(`contrast ${name}`, () => views, async () => {
+        const view = await open('metres', size);
+        if (size.touch) await view.page.click('#sheet');
+        for (const scheme of ['light', 'dark']) {
             await view.page.emulateMedia({colorScheme: scheme});
-            if (size.touch) await view.page.click('#sheet');
-            await view.shot(`${scheme}-${size.touch ? 'phone-open' : 'desktop'}`);
+            await view.shot(`${scheme}-${name}`);
             let found = await view.page.evaluate(contrasts);
             await view.page.evaluate(() => document.querySelector('#help').showModal());
+            await view.shot(`help-${scheme}-${name}`);
             found = found.concat(await view.page.evaluate(contrasts));
+            await view.page.keyboard.press('Escape');
             assert.ok(found.length > 20, `${found.length} texts`);
-            assert.deepEqual(found.filter(f => f.least < f.wanted), []);
-            await view.close();
+            assert.deepEqual(found.filter(f => f.least < f.wanted), [], scheme);
         }
+        await view.close();
     }));

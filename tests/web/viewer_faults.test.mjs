@@ -1,5 +1,9 @@
 // viewer_faults.test.mjs - what the page does when the service says no, says nonsense, or is gone.
 import assert from 'node:assert/strict';
+import {execFileSync} from 'node:child_process';
+import {mkdtempSync, rmSync} from 'node:fs';
+import {tmpdir} from 'node:os';
+import {join} from 'node:path';
 import {after, before, test} from 'node:test';
 import {DESKTOP, keepingShots, launch, openPage} from './browser.mjs';
 import {Service, TERRAINS} from './serve.mjs';
@@ -7,7 +11,10 @@ import {Service, TERRAINS} from './serve.mjs';
 let browser;
 const views = [];
 before(async () => { browser = await launch(); });
-after(() => browser.close());
+after(async () => {
+    await browser.close();
+    Service.endAll();
+});
 
 async function open(service, options = {}) {
     const view = await openPage(browser, service, {...DESKTOP, path: '#terrain=metres', ...options});
@@ -21,7 +28,7 @@ const sentence = view => view.page.evaluate(() => {
     const problem = document.querySelector('#problem');
     return problem.checkVisibility() ? problem.querySelector('p').textContent : '';
 });
-const until = (view, is) => view.page.waitForFunction(`(${is})(document.querySelector('#problem').checkVisibility())`);
+const until = (view, is) => view.until(() => document.querySelector('#problem').checkVisibility(), is);
 /** A camera a little further on each time. */
 const camera = async (view, n) => {
     const {camera: {eye, yaw, pitch}} = await view.state();
@@ -98,10 +105,25 @@ test('damaged answers: a sentence, the mesh before stays, and the page goes on',
     await service.stop();
 }));
 
-test('a service without terrains, and a terrain that is not there: a sentence', keepingShots('nothing', () => views, async () => {
-    const service = await Service.start();
-    const view = await open(service, {path: '#terrain=atlantis'});
-    assert.ok(Object.keys(TERRAINS).includes((await view.state()).terrain), 'another terrain is shown instead');
+test('a terrain that is not there: a sentence, and another one', keepingShots('atlantis', () => views, async () => {
+    const service = await Service.start(), view = await open(service, {path: '#terrain=atlantis'});
+    assert.match(await sentence(view), /atlantis/);
+    assert.ok(Object.keys(TERRAINS).includes((await view.state()).terrain));
+    assert.ok((await view.state()).triangles > 100);
     await view.close();
     await service.stop();
+}));
+
+test('databases without a terrain: a sentence', keepingShots('nothing', () => views, async () => {
+    const folder = mkdtempSync(join(tmpdir(), 'rqt_web_')), database = join(folder, 'empty.gpkg');
+    execFileSync('sqlite3', [database, 'CREATE TABLE empty (x)']);
+    const service = await Service.start({databases: [database]});
+    const view = await openPage(browser, service, DESKTOP);
+    views.splice(0, Infinity, view);
+    assert.match(await view.page.evaluate(() => document.body.innerText), /no terrain|nothing|no rqt|No database/i);
+    await view.shot('no-terrain');
+    assert.deepEqual(view.problems, []);
+    await view.close();
+    await service.stop();
+    rmSync(folder, {recursive: true});
 }));

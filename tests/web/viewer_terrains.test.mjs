@@ -1,7 +1,8 @@
 // viewer_terrains.test.mjs - terrains of each kind in the page: no complaint, a picture, and the mesh that SQL gives.
 import assert from 'node:assert/strict';
 import {after, before, test} from 'node:test';
-import {DESKTOP, PHONE, keepingShots, launch, openPage} from './browser.mjs';
+import {DESKTOP, PHONE, SMALL, keepingShots, launch, openPage} from './browser.mjs';
+import {decodeInC, isSame} from './oracle.mjs';
 import {colours} from './picture.mjs';
 import {Service, TERRAINS, sql} from './serve.mjs';
 
@@ -20,17 +21,11 @@ async function open(terrain, size) {
     return view;
 }
 
-/** The camera and the options with which the page asked for what it shows. */
-function question(view) {
-    const {camera, f, ...options} = view.lastAsked('/view').parameters;
-    return {camera, format: f, options: JSON.stringify(options, (key, value) => key === 'max_triangles' ? Number(value) : value)};
-}
-
 for (const terrain of Object.keys(TERRAINS))
     for (const [size, viewport] of Object.entries({desktop: DESKTOP, phone: PHONE})) {
         const name = `${terrain} on a ${size}`;
         test(`${name}: a picture, its figures, and no complaint`, keepingShots(name, () => views, async () => {
-            const view = await open(terrain, viewport), state = await view.state(), {camera, options} = question(view);
+            const view = await open(terrain, viewport), state = await view.state(), {camera, options} = view.question();
             await view.shot(`${terrain}-${size}`);
             assert.equal(state.terrain, terrain);
             assert.deepEqual(JSON.parse(camera), state.camera, 'the camera that is told is the one that was asked with');
@@ -52,9 +47,41 @@ for (const terrain of Object.keys(TERRAINS))
         }));
     }
 
-test('the mesh in the page is that of SQL, vertex by vertex and triangle by triangle', keepingShots('mesh', () => views, async () => {
+test('what is achieved: the header, the figure, its sentence and SQL say one thing', keepingShots('achieved', () => views, async () => {
+    // Every second answer has a budget that its camera needs more than.
+    let budget = null;
+    const prepare = page => page.route('**/view?*', route => {
+        const url = new URL(route.request().url());
+        if (budget) url.searchParams.set('max_triangles', budget);
+        return route.continue({url: url.href});
+    });
+    const view = await openPage(browser, service, {...DESKTOP, path: '#terrain=metres&tau=2', prepare});
+    views.splice(0, Infinity, view);
+    await view.settled();
+    const {camera: {eye}} = await view.state(), seen = new Set();
+    for (let i = 0; i < 10; i++) {
+        budget = i % 2 ? String(1500 + 100 * i) : null;
+        const state = await view.see({eye, yaw: 350 + 3 * i, pitch: -20 - i, position: 'crs', exaggeration: 1});
+        const {camera, options} = view.question(), {headers} = view.lastAsked('/view');
+        const [{tau, guaranteed}] = await sql('SELECT achieved_tau AS tau, guaranteed FROM rqt_view_triangles(:camera, :terrain, :options) LIMIT 1',
+            {camera, terrain: 'metres', options: JSON.stringify({...JSON.parse(options), ...(budget && {max_triangles: Number(budget)})})});
+        assert.equal(Number(headers['rqt-achieved-tau']), tau);
+        assert.equal(state.achievedTau, tau);
+        assert.equal(state.guaranteed, guaranteed);
+        const sentence = await view.page.evaluate(() => document.querySelector('#promise').textContent);
+        const [said] = /[\d.]+(?=\s*px)/.exec(sentence.replaceAll('\u202f', '')) ?? [];
+        assert.ok(Math.abs(Number(said) - tau) <= 0.006 * tau, `${sentence} where it is ${tau}`);
+        seen.add(tau);
+    }
+    assert.ok(seen.size > 3 && Math.max(...seen) > 2, [...seen].join());
+    await view.close();
+}));
+
+test('the mesh in the page is the C decoder\'s, and that of SQL, vertex by vertex and triangle by triangle', keepingShots('mesh', () => views, async () => {
     for (const terrain of Object.keys(TERRAINS)) {
-        const view = await open(terrain, DESKTOP), mesh = await view.mesh(), {camera, options} = question(view);
+        const view = await open(terrain, SMALL), mesh = await view.mesh(), {camera, options} = view.question();
+        const bytes = new Uint8Array(await (await fetch(view.lastAsked('/view').url)).arrayBuffer()), [inC] = decodeInC([{what: 'M', bytes}]);
+        for (const name of ['col', 'row', 'q', 'triangles']) assert.ok(isSame(mesh[name], inC[name]), `${name} of ${terrain}`);
         const rows = await sql('SELECT col, row, q FROM rqt_view(:camera, :terrain, :options) ORDER BY 1, 2', {camera, terrain, options});
         const order = Array.from(mesh.col.keys()).sort((a, b) => mesh.col[a] - mesh.col[b] || mesh.row[a] - mesh.row[b]);
         assert.deepEqual(order.map(v => [mesh.col[v], mesh.row[v], mesh.q[v]]), rows.map(r => [r.col, r.row, r.q]), terrain);

@@ -1,0 +1,214 @@
+// page.test.mjs - the page's modules that need no browser: cameras, picking, edges, the stream of questions, the address.
+import assert from 'node:assert/strict';
+import {test} from 'node:test';
+import {Camera, lookAtAll} from '../../src/web/camera.js';
+import {Fly} from '../../src/web/fly.js';
+import {CHUNK, buildGeometry, edgesOf} from '../../src/web/geometry.js';
+import {Orbit} from '../../src/web/orbit.js';
+import {groundBelow, pickPoint} from '../../src/web/pick.js';
+import {Place} from '../../src/web/place.js';
+import {ticksOf} from '../../src/web/profile.js';
+import {add, createScene, dot, length, subtract, unit} from '../../src/web/scene.js';
+import {readFragment, writeFragment} from '../../src/web/state.js';
+import {Dice} from './oracle.mjs';
+
+const DEGREES = 'GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],UNIT["degree",0.0174532925199433]]';
+const FEET = 'PROJCS["feet",GEOGCS["NAD83",UNIT["degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],UNIT["US survey foot",0.3048006096012192]]';
+const SCENES = {degrees: createScene(DEGREES), feet: createScene(FEET), bare: createScene('')};
+const near = (a, b, most, why) => assert.ok(a.every((v, i) => Math.abs(v - b[i]) <= most), `${why}: ${a} and ${b}`);
+
+const dice = new Dice(20260);
+const random = (low, high) => low + (high - low) * dice.below(2 ** 31) / 2 ** 31;
+console.log(`RQT_SEED=${dice.seed}`);
+
+function randomCamera(scene) {
+    const camera = new Camera(scene);
+    Object.assign(camera, {width: 640, height: 400, fovy: random(10, 90), yaw: random(0, 360), pitch: random(-80, 60)});
+    camera.eye = scene.point(scene.isSpace ? [random(-180, 180), random(-85, 85), random(100, 1e6)] : [random(-1e6, 1e6), random(-1e6, 1e6), random(10, 9000)]);
+    return camera;
+}
+
+/** A mesh with ridges: (n + 1)^2 samples, all of them vertices. */
+function ridges(n, place) {
+    const mesh = {...place, z0: 0, d: 1, numerator: 1, denominator: 1, scale: 1, offset: 0, vertexCount: (n + 1) ** 2, normals: null, errors: null};
+    const grid = from => Int32Array.from({length: mesh.vertexCount}, (_, i) => from(i % (n + 1), Math.floor(i / (n + 1))));
+    Object.assign(mesh, {col: grid(x => x), row: grid((x, y) => y), q: grid((x, y) => Math.round(300 * Math.sin(x / 3) * Math.cos(y / 5)) + dice.below(40))});
+    mesh.triangles = new Uint32Array(6 * n * n);
+    let at = 0;
+    for (let y = 0; y < n; y++)
+        for (let x = 0; x < n; x++) {
+            const a = y * (n + 1) + x, b = a + 1, c = a + n + 1, d = c + 1;
+            for (const v of (x + y) % 2 ? [a, c, b, b, c, d] : [a, d, b, a, c, d]) mesh.triangles[at++] = v;
+        }
+    return mesh;
+}
+
+test('a CRS in feet is metres in the scene, one in degrees is geocentric', () => {
+    near(SCENES.feet.point([1000, 2000, 30]), [304.8006096012192, 609.6012192024384, 30], 1e-9, 'feet');
+    assert.equal(SCENES.degrees.isSpace, true);
+    assert.equal(SCENES.bare.metre, 1);
+    assert.equal(createScene(`COMPD_CS["x",${DEGREES},VERT_CS["h",UNIT["metre",1]]]`).isSpace, true);
+    assert.equal(createScene(`COMPD_CS["x",${FEET},VERT_CS["h",UNIT["metre",1]]]`).metre, 0.3048006096012192);
+});
+
+test('a camera is what its JSON says: read again it asks the same', () => {
+    for (const scene of Object.values(SCENES))
+        for (let i = 0; i < 200; i++) {
+            const camera = randomCamera(scene), again = new Camera(scene), json = camera.json(1.5);
+            again.read(json);
+            Object.assign(again, {width: camera.width, height: camera.height});
+            assert.deepEqual(again.json(1.5), json);
+            assert.ok(length(subtract(again.eye, camera.eye)) < 1e-3);
+        }
+});
+
+test('a direction of the picture leads to what is projected there', () => {
+    for (const scene of Object.values(SCENES))
+        for (let i = 0; i < 200; i++) {
+            const camera = randomCamera(scene), at = [random(-1, 1), random(-1, 1)];
+            const seen = camera.project(add(camera.eye, camera.direction(...at), random(1, 1e5)));
+            near([seen.x, seen.y], at, 1e-6, 'there');
+        }
+});
+
+test('a camera looks to the north and up where its angles say so', () => {
+    const camera = new Camera(SCENES.bare);
+    Object.assign(camera, {yaw: 90, pitch: 0});
+    near(camera.basis().forward, [1, 0, 0], 1e-12, 'east');
+    camera.turn(-90, 30);
+    near(camera.basis().forward, [0, Math.cos(Math.PI / 6), 0.5], 1e-12, 'north and upward');
+    camera.read({eye: [0, 0, 100], at: [0, 100, 0]});
+    near([camera.yaw, camera.pitch], [0, -45], 1e-9, 'at');
+});
+
+test('the whole terrain is in the picture, in any shape of window', () => {
+    for (const [scene, box] of [[SCENES.degrees, [-72, 44, -71, 45]], [SCENES.degrees, [1, 41, 2, 43]], [SCENES.bare, [0, 0, 4000, 4000]], [SCENES.feet, [5e5, 4e6, 9e5, 4.1e6]]])
+        for (const [width, height] of [[1280, 800], [360, 600], [600, 360]]) {
+            const camera = new Camera(scene);
+            Object.assign(camera, {width, height, fovy: Camera.usualAngle(width, height)});
+            lookAtAll(camera, box, [100, 2000]);
+            let most = 0;
+            for (const x of [box[0], box[2]])
+                for (const y of [box[1], box[3]])
+                    for (const z of [100, 2000]) {
+                        const seen = camera.project(scene.point([x, y, z]));
+                        assert.ok(Math.abs(seen.x) < 1 && Math.abs(seen.y) < 1, JSON.stringify(seen));
+                        most = Math.max(most, Math.abs(seen.x) / 0.93, Math.abs(seen.y) / 0.9);
+                    }
+            assert.ok(most > 0.97, `it fills the picture: ${most}`);
+        }
+});
+
+test('orbit: the ground that is held stays where it is in the picture, or under the pointer', () => {
+    let moves = 0;
+    for (const scene of Object.values(SCENES))
+        for (let i = 0; i < 100; i++) {
+            const camera = randomCamera(scene);
+            camera.pitch = random(-70, -15);
+            const distance = random(1.2, 4) * camera.place[2], at = [random(-0.6, 0.6), random(-0.6, 0.6)];
+            const point = add(camera.eye, camera.direction(...at), distance), orbit = new Orbit(camera, () => point, 1e9);
+            const seen = () => { const {x, y} = camera.project(point); return [x, y]; };
+            orbit.begin(at);
+            orbit.drag('turn', at, [at[0] + 0.2, at[1] - 0.1]);
+            orbit.end();
+            assert.ok(Math.abs(length(subtract(camera.eye, point)) / distance - 1) < 1e-9, 'as far away');
+            // Straight down, a camera without roll cannot show everything anywhere.
+            const {up} = scene.axes(scene.place(point)), isSteep = dot(unit(subtract(camera.eye, point)), up) > 0.6;
+            if (!isSteep) near(seen(), at, 1e-6, 'turned');
+            const held = seen();
+            orbit.zoom(0.5, held);
+            assert.ok(Math.abs(length(subtract(camera.eye, point)) / distance - 0.5) < 1e-9, 'half as far');
+            if (!isSteep) near(seen(), held, 1e-6, 'nearer');
+            const from = seen(), to = [from[0] + 0.05, from[1] - 0.05];
+            const before = camera.eye;
+            orbit.begin(from);
+            orbit.drag('pan', from, to);
+            const moved = length(subtract(camera.eye, before)) > 0;
+            if (moved && !isSteep) near(seen(), to, 1e-6, 'moved');
+            moves += moved && !isSteep;
+        }
+    assert.ok(moves > 100, `${moves}`);
+});
+
+test('orbit: nobody gets lost by zooming out', () => {
+    const camera = randomCamera(SCENES.bare), point = add(camera.eye, camera.direction(0, 0), 1000), orbit = new Orbit(camera, () => point, 5000);
+    for (let i = 0; i < 20; i++) orbit.zoom(1.5, [0, 0]);
+    near([length(subtract(camera.eye, point))], [5000], 1e-6, 'as far as there is something to see');
+});
+
+test('flying is as fast as the ground is far, and level flight keeps its height round the Earth', () => {
+    for (const scene of Object.values(SCENES)) {
+        const camera = randomCamera(scene), fly = new Fly(camera, () => 500);
+        camera.eye = scene.point(scene.isSpace ? [10, 45, 3000] : [1e5, 1e5, 3000]);
+        Object.assign(camera, {yaw: 70, pitch: 0});
+        const from = camera.eye;
+        for (let i = 0; i < 100; i++) fly.step(0.1, {ahead: 1, right: 0, up: 0, yaw: 0, pitch: 0, fast: false});
+        assert.ok(Math.abs(length(subtract(camera.eye, from)) - 5000) < 5, `${length(subtract(camera.eye, from))}`);
+        near([camera.place[2]], [3000], 1e-6, 'the height');
+    }
+});
+
+test('picking: the nearest triangle on the ray, as all of them say one by one', () => {
+    for (const [name, how, frame] of [['metres', {lonlat: false}, {x0: 5e5, y0: 4e6, dx: 30, dy: -30}], ['degrees', {lonlat: true}, {x0: -71, y0: 45, dx: 0.0003, dy: -0.0003}]]) {
+        const place = new Place(how), mesh = ridges(40, frame), scene = name === 'degrees' ? SCENES.degrees : SCENES.bare;
+        const middle = [frame.x0 + 20 * frame.dx, frame.y0 + 20 * frame.dy], eye = scene.point([...middle, 900]);
+        const geometry = buildGeometry(mesh, place, eye, false);
+        assert.ok(geometry.boxes.length / 6 === Math.ceil(mesh.triangles.length / 3 / CHUNK));
+        const corner = v => [0, 1, 2].map(axis => geometry.positions[3 * v + axis] + eye[axis]);
+        let hits = 0, misses = 0;
+        for (let i = 0; i < 60; i++) {
+            const target = scene.point([frame.x0 + random(-10, 50) * frame.dx, frame.y0 + random(-10, 50) * frame.dy, random(-200, 200)]);
+            const ray = unit(subtract(target, eye)), found = pickPoint(geometry, eye, ray);
+            // Every triangle's plane, and on which sides of its edges the ray passes, by volumes.
+            let nearest = Infinity;
+            for (let t = 0; t < mesh.triangles.length; t += 3) {
+                const [a, b, c] = [0, 1, 2].map(k => subtract(corner(mesh.triangles[t + k]), eye));
+                const volume = (p, q) => dot([p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]], ray);
+                const sides = [volume(a, b), volume(b, c), volume(c, a)], sum = sides[0] + sides[1] + sides[2];
+                if (!(sides.every(s => s >= 0) || sides.every(s => s <= 0)) || sum === 0) continue;
+                const at = [0, 1, 2].map(axis => (sides[1] * a[axis] + sides[2] * b[axis] + sides[0] * c[axis]) / sum), far = dot(at, ray);
+                if (far > 0) nearest = Math.min(nearest, far);
+            }
+            if (nearest === Infinity) misses++;
+            else hits++;
+            assert.equal(found !== null, nearest < Infinity);
+            if (found) near([length(subtract(found, eye))], [nearest], 1e-5 * nearest, name);
+        }
+        assert.ok(hits > 15 && misses > 5, `${hits} hits, ${misses} misses`);
+        const ground = scene.place(groundBelow(geometry, scene, eye));
+        near(ground, [...middle, mesh.q[20 * 41 + 20]], 0.01, 'the ground below the eye is its vertex');
+        const under = scene.place(groundBelow(geometry, scene, scene.point([...middle, -900])));
+        near(under, ground, 0.01, 'and is found from below, too');
+    }
+});
+
+test('edges: every side of a triangle, once', () => {
+    const mesh = ridges(23, {x0: 0, y0: 0, dx: 1, dy: 1}), edges = edgesOf(mesh.triangles), wanted = new Set(), got = new Set();
+    for (let i = 0; i < mesh.triangles.length; i += 3)
+        for (const [p, q] of [[0, 1], [1, 2], [2, 0]]) {
+            const ends = [mesh.triangles[i + p], mesh.triangles[i + q]].sort((a, b) => a - b);
+            wanted.add(ends.join());
+        }
+    for (let i = 0; i < edges.length; i += 2) got.add([edges[i], edges[i + 1]].sort((a, b) => a - b).join());
+    assert.equal(edges.length, 2 * wanted.size);
+    assert.deepEqual([...got].sort(), [...wanted].sort());
+});
+
+test('ticks are round numbers within the axis', () => {
+    for (let i = 0; i < 200; i++) {
+        const low = random(-5000, 5000), high = low + 10 ** random(-1, 5), many = random(2, 10), ticks = ticksOf(low, high, many);
+        assert.ok(ticks.every(tick => tick >= low - 1e-9 && tick <= high * (1 + 1e-9) + 1e-9) && ticks.length <= many + 1, `${low} ${high}: ${ticks}`);
+        const step = ticks[1] - ticks[0], digits = step / 10 ** Math.floor(Math.log10(step * (1 + 1e-9)));
+        if (ticks.length > 1) assert.ok([1, 2, 5].some(d => Math.abs(digits - d) < 1e-6), `${step}`);
+    }
+});
+
+test('the address says what is shown, and nonsense in it nothing', () => {
+    const state = {terrain: 'a b/&=c', eye: [-71.25, 44.5, 1234.567], yaw: 12.3456, pitch: -8, fovy: 40, exaggeration: 2.5, ask: 'view', tau: 1.5, colour: 'error', wires: true, mode: 'fly'};
+    const {camera, ...read} = readFragment(writeFragment(state));
+    assert.deepEqual(camera, {eye: state.eye, yaw: state.yaw, pitch: state.pitch, fovy: state.fovy});
+    for (const key of ['terrain', 'exaggeration', 'ask', 'tau', 'colour', 'wires', 'mode']) assert.equal(read[key], state[key], key);
+    assert.equal(read.capture, false);
+    const nonsense = readFragment('#eye=1,2&tau=-3&eps=many&ask=all&colour=__proto__&mode=&exaggeration=NaN');
+    for (const [key, value] of Object.entries(nonsense)) assert.ok(value === undefined || value === false, `${key}: ${value}`);
+});
