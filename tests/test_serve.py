@@ -626,6 +626,12 @@ equal("what the other has is answered", ask(PLAIN).body, sql_of(one))
 equal("what neither has may be in the damaged one", ask("/collections/nobody").status, 500)
 equal("it ends", service.stop(), (0, ""))
 
+# a region whose edges are all in every row: each sample takes its time
+zigzag = "POLYGON((%s,-71.5 44.01,-71.99 44.01))" % ",".join("%.4f %s" % (-71.99 + 0.98 * i / 1000, "44.99" if i % 2 else "44.01") for i in range(1001))
+service = Service(DB, "--max-seconds", "1")
+equal("a proof ends with its time", service.ask(HILLS + "/verify", {"eps": 1000, "wkt": zigzag}).status, 503)
+equal("it ends", service.stop(), (0, ""))
+
 # --------------------------------------------------------------------------------------------------- hostile databases
 hostile = s.temp("hostile.gpkg")
 shutil.copy(pristine, hostile)
