@@ -11,6 +11,7 @@ MUTANTS = [
     ("viewer: a tilt lets go", "src/web/orbit.js", "camera.hold(anchor, this.at);", "camera.hold(anchor, [0, 0]);", PAGE, "the ground that is held"),
     ("viewer: zooming is for the middle", "src/web/orbit.js", "camera.hold(point, held);", "camera.hold(point, [0, 0]);", PAGE, "the ground that is held"),
     ("viewer: zooming out has no end", "src/web/orbit.js", "Math.min(factor, most)", "factor", PAGE, "nobody gets lost"),
+    ("viewer: every ellipsoid is that of WGS 84", "src/web/scene.js", "semiMajor: terrain.semi_major, inverseFlattening: terrain.inverse_flattening", "semiMajor: 6378137", PAGE, "a CRS in feet is metres in the scene"),
     ("viewer: the Earth is flat", "src/web/orbit.js", "    if (!scene.isSpace) {\n        camera.eye = add(eye, by);", "    if (true) {\n        camera.eye = add(eye, by);", PAGE, "level flight keeps its height"),
     ("viewer: the terrain may stick out", "src/web/camera.js", "high - low < 1.8 && ", "", PAGE, "the whole terrain is in the picture"),
     ("viewer: boxes have no top", "src/web/geometry.js", "if (value > boxes[at + 3 + axis]) boxes[at + 3 + axis] = value;", "if (value > boxes[at + 3 + axis] && axis < 2) boxes[at + 3 + axis] = value;", PAGE, "picking"),
