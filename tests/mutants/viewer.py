@@ -3,8 +3,7 @@
 PAGE, STREAM = "web/page.test.mjs", "web/stream.test.mjs"
 
 MUTANTS = [
-    ("viewer: feet are metres", "src/web/scene.js", "const metre = units.length ? Number(units[units.length - 1][1]) : 1;", "const metre = 1;", PAGE, "a CRS in feet"),
-    ("viewer: the base's unit is the unit", "src/web/scene.js", "Number(units[units.length - 1][1])", "Number(units[0][1])", PAGE, "a CRS in feet"),
+    ("viewer: feet are metres", "src/web/scene.js", "{lonlat: false, metre: terrain.metre}", "{lonlat: false}", PAGE, "a CRS in feet is metres in the scene"),
     ("viewer: yaw goes the other way", "src/web/camera.js", "add(scaled(east, Math.sin(yaw)), north, Math.cos(yaw))", "add(scaled(east, -Math.sin(yaw)), north, Math.cos(yaw))", PAGE, "looks to the north"),
     ("viewer: the picture is square", "src/web/camera.js", "x: dot(from, right) / (tangent * this.width / this.height)", "x: dot(from, right) / tangent", PAGE, "a direction of the picture"),
     ("viewer: places are rounded to metres", "src/web/camera.js", "const [x, y, height] = this.place, digits = this.scene.isSpace ? 9 : 4;", "const [x, y, height] = this.place, digits = 4;", PAGE, "a camera is what its JSON says"),
