@@ -1,4 +1,5 @@
 """What the tests of the query service share: a service on a port of its own, and a client."""
+import ctypes
 import http.client
 import json
 import os
@@ -43,11 +44,17 @@ class Nothing(Answer):
         return {}
 
 
+def ends_with_parent():
+    """However a test ends, killed too, its service does not go on without it."""
+    PR_SET_PDEATHSIG = 1
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
 class Service:
     def __init__(self, *arguments, **environment):
         self.log = open(s.temp("serve.log"), "w+")
         self.process = subprocess.Popen([s.RQT, "serve", "--port", "0", *arguments], stdout=subprocess.PIPE, stderr=self.log, text=True,
-                                        env=dict(os.environ, **environment))
+                                        env=dict(os.environ, **environment), preexec_fn=ends_with_parent)
         self.url = self.process.stdout.readline().strip()
         self.port = int(urllib.parse.urlsplit(self.url).port or 0) if self.url else 0
         self.connection = None

@@ -7,8 +7,6 @@ MUTANTS = [
     ("cover: the picture is the terrain", "ext/view_field.c", "r->cover == VIEW_TERRAIN", "r->cover <= VIEW_TERRAIN", COVER, "who looks away"),
     ("cover: what is not seen is as fine", "ext/view_field.c", "*eps = bound.eps / v->scene.exaggeration;", "*eps = shown ? bound.eps / v->scene.exaggeration : 1;", COVER,
      "who looks away"),
-    ("cover: what is not seen may be anything", "ext/view_field.c", "*eps = bound.eps / v->scene.exaggeration;", "*eps = shown ? bound.eps / v->scene.exaggeration : INFINITY;",
-     COVER, "proved"),
     ("cover: a token does not know it", "ext/token.c", "fold(fold(h, (uint64_t)r->max_triangles), r->cover)", "fold(h, (uint64_t)r->max_triangles)", COVER,
      "a token is one of what is covered"),
     ("cover: of regions, too", "ext/request.c", ': r->has_cover         ? "cover"\n', "\n", COVER, "cover is for views"),
