@@ -105,6 +105,7 @@ export class Viewer {
         this.terrain = terrain;
         this.measure.clear();
         this.layer.clear();
+        this.figures.showNothing();
         this.stage = null;
         this.scene = createScene(terrain.terrain);
         // The same object for the same terrain: by this the worker knows it.
@@ -215,6 +216,12 @@ export class Viewer {
     /** The point of the mesh at a place of the picture, or null. */
     pointAt(at) {
         return this.stage && pickPoint(this.stage.geometry, this.camera.eye, this.camera.direction(...at));
+    }
+
+    /** Is the mesh at a place of the picture well in front of a depth? */
+    hides(x, y, depth) {
+        const point = this.pointAt([x, y]);
+        return Boolean(point) && this.camera.project(point).depth < 0.98 * depth;
     }
 
     ground() {
@@ -331,7 +338,7 @@ export class Viewer {
         frames.cost = performance.now() - started;
         this.stream.want(this.wish());
         const {clientWidth, clientHeight} = element('picture');
-        this.marks.place(camera, clientWidth, clientHeight);
+        this.marks.place(camera, clientWidth, clientHeight, (x, y, depth) => this.hides(x, y, depth));
         element('needle').setAttribute('transform', `rotate(${-camera.yaw})`);
         const [x, y] = camera.place;
         this.figures.showEye(clearance, placeText(x, y, this.scene.isSpace, 4));

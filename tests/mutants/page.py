@@ -22,6 +22,8 @@ MUTANTS = [
     ("browser: a button without a name", "src/web/index.html", ' title="Back to north (N)" aria-label="Back to north"', "", CONTROLS, "names: every control"),
     ("browser: pale words", "src/web/viewer.css", "--quiet: #626a73;", "--quiet: #9aa2ab;", CONTROLS, "in the dark, on a desktop"),
     ("browser: not by Tab", "src/web/index.html", '<input id="tau" type="range"', '<input id="tau" tabindex="-1" type="range"', CONTROLS, "every control is reached"),
+    ("browser: the sheet hides the terrain", "src/web/viewer.css", "translateY(calc((var(--grip) - var(--sheet)) / 2))", "none", CONTROLS, "on a phone the open sheet"),
+    ("browser: a claim of nothing", "src/web/figures.js", "        this.showNothing();\n", "", FAULTS, "more than the service gives"),
     ("browser: damaged bytes are not told", "src/web/stream.js", "if (data.problem) reject(new Error(data.problem));", "if (data.problem) resolve(null);", FAULTS, "damaged answers"),
     ("gaps: a neighbour is enough", "tests/web/picture.mjs", "[-apart(step), apart(step)].every(", "[-apart(step), apart(step)].some(", PICTURE, "a silhouette along the lines"),
     ("gaps: the bottom is no terrain", "tests/web/picture.mjs", "first[other] < step && step < last[other]", "first[other] < step && step + 30 < last[other]", PICTURE, "a pixel inside is a gap"),

@@ -61,12 +61,17 @@ test('more than the service gives: its sentence is shown, and a coarser mesh com
     await until(view, shown => shown);
     assert.match(await sentence(view), /3000/);
     await view.shot('service-says-no');
+    // Nothing is claimed of nothing.
+    const claim = () => document.querySelector('#claim').innerText.trim();
+    assert.equal(await view.page.evaluate(claim), 'Nothing is shown yet.');
+    assert.equal(await view.page.evaluate(() => document.querySelector('#promise').checkVisibility()), false);
     await view.page.focus('#eps');
     await view.page.keyboard.press('End');
     await until(view, shown => !shown);
     await view.settled();
     const {triangles} = await view.state();
     assert.ok(triangles > 0 && triangles <= 3000, `${triangles}`);
+    assert.match(await view.page.evaluate(claim), /triangles[^]*Proved: /);
     await view.close();
     await service.stop();
 }));
