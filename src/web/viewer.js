@@ -19,7 +19,7 @@ import {Panel} from './panel.js';
 import {groundBelow, pickPoint} from './pick.js';
 import {Picture} from './picture.js';
 import {Profile} from './profile.js';
-import {add, createScene, dot, length, subtract} from './scene.js';
+import {add, clamp, createScene, dot, length, subtract} from './scene.js';
 import {rangePath, viewPath} from './service.js';
 import {readFragment, writeFragment} from './state.js';
 import {Stream} from './stream.js';
@@ -95,6 +95,7 @@ export class Viewer {
         if (camera) {
             this.camera.read({...camera, exaggeration: this.settings.exaggeration});
             this.glide.stop();
+            this.isStandTaken = true;
         }
         this.changed();
     }
@@ -118,6 +119,7 @@ export class Viewer {
         this.camera.exaggeration = this.settings.exaggeration;
         this.picture.fit(this.camera);
         this.stand();
+        this.isStandTaken = false;
         document.title = `${terrain.id} \u2013 rqt`;
     }
 
@@ -129,10 +131,17 @@ export class Viewer {
 
     stand() {
         this.camera.fovy = Camera.usualAngle(this.camera.width, this.camera.height);
-        lookAtAll(this.camera, this.terrain.bbox, this.heights());
+        lookAtAll(this.camera, this.terrain.bbox, this.heights(), this.stage?.geometry, this.openShare());
+    }
+
+    /** How much of the picture's height a phone's sheet leaves: its middle is that of what is left (viewer.css). */
+    openShare() {
+        const canvas = element('picture').getBoundingClientRect();
+        return clamp(1 + 2 * canvas.top / canvas.height, 0.2, 1);
     }
 
     lookAtAll() {
+        this.isStandTaken = true;
         this.glide.to(() => this.stand(), performance.now(), isStill.matches);
         this.redraw();
     }
@@ -203,6 +212,7 @@ export class Viewer {
     /** The camera has moved by hand. */
     moved() {
         this.glide.stop();
+        this.isStandTaken = true;
         element('hint').classList.add('gone');
         this.redraw();
     }
@@ -286,6 +296,9 @@ export class Viewer {
     async show(stage) {
         if (stage.wish.terrain !== this.terrain.forWorker) return;
         this.stage = {...stage, errorRange: rangeOf(stage.geometry.errors)};
+        // How high the terrain is where is known by its first mesh: nobody has seen it from anywhere else yet.
+        if (!this.isStandTaken) this.stand();
+        this.isStandTaken = true;
         this.layer.show(stage, performance.now());
         this.figures.showStage(stage, this.terrain);
         element('bare').href = stage.wish.path;
@@ -388,6 +401,7 @@ export class Viewer {
 
     setCamera(json) {
         this.glide.stop();
+        this.isStandTaken = true;
         this.camera.read(json);
         if (json.tau > 0) this.settings.tau = json.tau;
         this.settings.exaggeration = this.camera.exaggeration;
