@@ -110,7 +110,7 @@ for (const [size, viewport] of Object.entries({desktop: DESKTOP, phone: PHONE}))
     }));
 
 test('a height behind the mountain is faint', keepingShots('behind', () => views, async () => {
-    const view = await open('metres'), {camera} = await view.state();
+    const view = await open('metres', DESKTOP), {camera} = await view.state();
     await click(view, [Math.round(camera.width * 0.55), Math.round(camera.height * 0.5)]);
     await view.page.waitForFunction(() => /\d/.test(document.querySelector('#pins text')?.textContent));
     const opacity = () => view.page.evaluate(() => Number(getComputedStyle(document.querySelector('#pins g')).opacity));
