@@ -37,7 +37,6 @@ export class Figures {
             element('figures').append(term, value);
             this.values.set(name, value);
         }
-        this.showNothing();
     }
 
     set(name, text) {

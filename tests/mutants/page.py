@@ -25,7 +25,7 @@ MUTANTS = [
     ("browser: the sheet hides the terrain", "src/web/viewer.css", "translateY(calc((var(--grip) - var(--sheet)) / 2))", "none", CONTROLS, "on a phone the open sheet"),
     ("browser: the card is asked for what it lost", "src/web/picture.js", "            this.forget();\n", "", FAULTS, "the graphics card takes"),
     ("browser: pins are seen through mountains", "src/web/viewer.js", "depth < 0.98 * depth", "depth < 0 * depth", PICK, "a height behind"),
-    ("browser: a claim of nothing", "src/web/figures.js", "        this.showNothing();\n", "", FAULTS, "more than the service gives"),
+    ("browser: a claim of nothing", "src/web/viewer.js", "        this.figures.showNothing();\n", "", FAULTS, "more than the service gives"),
     ("browser: damaged bytes are not told", "src/web/stream.js", "if (data.problem) reject(new Error(data.problem));", "if (data.problem) resolve(null);", FAULTS, "damaged answers"),
     ("gaps: a neighbour is enough", "tests/web/picture.mjs", "[-apart(step), apart(step)].every(", "[-apart(step), apart(step)].some(", PICTURE, "a silhouette along the lines"),
     ("gaps: the bottom is no terrain", "tests/web/picture.mjs", "first[other] < step && step < last[other]", "first[other] < step && step + 30 < last[other]", PICTURE, "a pixel inside is a gap"),
