@@ -44,9 +44,18 @@ export class Figures {
         if (value.textContent !== text) value.textContent = text;
     }
 
+    /** Of a terrain of which no mesh has come. */
+    showNothing() {
+        element('triangles').parentElement.hidden = true;
+        element('share').textContent = element('summary').textContent = 'Nothing is shown yet.';
+        element('promise').textContent = '';
+        for (const name of ['Vertices', 'Received', 'Answer', 'Decoding']) this.set(name, '\u2013');
+    }
+
     /** @param stage of stream.js @param terrain as service.js has it */
     showStage(stage, terrain) {
         const {vertexCount, triangleCount} = stage.mesh, promise = promiseOf(stage);
+        element('triangles').parentElement.hidden = false;
         element('triangles').textContent = count(triangleCount);
         element('share').textContent = share(triangleCount, allTriangles(terrain.terrain));
         element('promise').textContent = promise.text;

@@ -7,6 +7,7 @@ import {subtract} from './scene.js';
 
 const NAMESPACE = 'http://www.w3.org/2000/svg';
 const STEM = 22; // CSS pixels from the place to its label
+const FOOT = 4; // CSS pixels of a pin that the ground may hide
 
 function pinNode(label) {
     const node = document.createElementNS(NAMESPACE, 'g');
@@ -73,12 +74,18 @@ export class Marks {
         this.line([]);
     }
 
-    /** Puts everything where the camera sees it. */
-    place(camera, width, height) {
+    /**
+     * Puts everything where the camera sees it.
+     * @param hides(x, y, depth) is something in front of that depth, at a place of the picture?
+     */
+    place(camera, width, height, hides) {
         for (const {point, node} of this.pins.values()) {
             const at = camera.project(point);
             node.style.display = at ? '' : 'none';
-            if (at) node.setAttribute('transform', `translate(${(at.x + 1) / 2 * width} ${(1 - at.y) / 2 * height})`);
+            if (!at) continue;
+            node.setAttribute('transform', `translate(${(at.x + 1) / 2 * width} ${(1 - at.y) / 2 * height})`);
+            // Looked for a little above its foot: the mesh there may be as much higher than the terrain.
+            node.classList.toggle('behind', hides(at.x, at.y + 2 * FOOT / height, at.depth));
         }
     }
 }

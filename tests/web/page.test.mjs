@@ -84,22 +84,38 @@ test('a camera looks to the north and up where its angles say so', () => {
     near([camera.yaw, camera.pitch], [0, -45], 1e-9, 'at');
 });
 
+/** What of the picture points take: {x, y, width, height}, x and y of the middle. */
+function frameOf(camera, points) {
+    const seen = points.map(point => camera.project(point));
+    assert.ok(seen.every(one => one && Math.abs(one.x) < 1 && Math.abs(one.y) < 1), 'every point is in the picture');
+    const [xs, ys] = ['x', 'y'].map(axis => seen.map(one => one[axis]));
+    const [left, right, low, high] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
+    return {x: (left + right) / 2, y: (low + high) / 2, width: right - left, height: high - low};
+}
+
 test('the whole terrain is in the picture, in any shape of window', () => {
-    for (const [scene, box] of [[SCENES.degrees, [-72, 44, -71, 45]], [SCENES.degrees, [1, 41, 2, 43]], [SCENES.bare, [0, 0, 4000, 4000]], [SCENES.feet, [5e5, 4e6, 9e5, 4.1e6]]])
-        for (const [width, height] of [[1280, 800], [360, 600], [600, 360]]) {
-            const camera = new Camera(scene);
-            Object.assign(camera, {width, height, fovy: Camera.usualAngle(width, height)});
-            lookAtAll(camera, box, [100, 2000]);
-            let most = 0;
-            for (const x of [box[0], box[2]])
-                for (const y of [box[1], box[3]])
-                    for (const z of [100, 2000]) {
-                        const seen = camera.project(scene.point([x, y, z]));
-                        assert.ok(Math.abs(seen.x) < 1 && Math.abs(seen.y) < 1, JSON.stringify(seen));
-                        most = Math.max(most, Math.abs(seen.x) / 0.93, Math.abs(seen.y) / 0.9);
-                    }
-            assert.ok(most > 0.97, `it fills the picture: ${most}`);
-        }
+    const globe = [-180, -90, 180, 90], places = [[SCENES.degrees, [-72, 44, -71, 45]], [SCENES.degrees, [1, 41, 2, 43]],
+        [SCENES.degrees, [-20, -35, 50, 37]], [SCENES.degrees, globe], [SCENES.bare, [0, 0, 4000, 4000]], [SCENES.feet, [5e5, 4e6, 9e5, 4.1e6]]];
+    for (const [scene, box] of places)
+        for (const [width, height, share] of [[1280, 800, 1], [360, 600, 1], [600, 360, 1], [360, 600, 0.58]])
+            for (const highest of [2000, 300]) {
+                const camera = new Camera(scene), points = [];
+                Object.assign(camera, {width, height, fovy: Camera.usualAngle(width, height)});
+                for (let i = 0; i <= 8; i++)
+                    for (let j = 0; j <= 8; j++)
+                        for (const z of [100, 100 + (highest - 100) * j / 8])
+                            points.push(scene.point([box[0] + (box[2] - box[0]) * i / 8, box[1] + (box[3] - box[1]) * j / 8, z]));
+                // A mesh may be anywhere between its lowest and highest height: it is its own picture that is in the middle.
+                const origin = points[0], mesh = {origin, positions: points.flatMap(point => subtract(point, origin))};
+                lookAtAll(camera, box, [100, 2000], mesh, share);
+                const found = frameOf(camera, points), why = JSON.stringify({box, width, height, share, highest, ...found});
+                near([found.x, found.y], [0, 0], 0.001, why);
+                assert.ok(Math.max(found.width / 1.86, found.height / 1.8 / share) > 0.999, `it fills the picture: ${why}`);
+                assert.ok(found.height < 1.8 * share + 1e-6, why);
+                assert.equal(camera.yaw, 0);
+                lookAtAll(camera, box, [100, 2000]);
+                frameOf(camera, points);
+            }
 });
 
 test('orbit: the ground that is held stays where it is in the picture, or under the pointer', () => {

@@ -138,6 +138,30 @@ test('names: every control says what it is', keepingShots('names', () => views, 
     await view.close();
 }));
 
+test('on a phone the open sheet leaves the terrain to be seen, and what its sliders do', keepingShots('sheet', () => views, async () => {
+    const view = await open('metres', PHONE);
+    await view.page.click('#sheet');
+    await view.settled();
+    const top = await view.page.evaluate(() => document.querySelector('#panel').getBoundingClientRect().top);
+    assert.ok(top > 0.5 * PHONE.height, `the sheet begins at ${top}`);
+    const before = await view.picture(), pixels = new Uint32Array(before.rgba.buffer), ground = pixels[0];
+    const rows = Array.from({length: before.height}, (none, y) => pixels.subarray(y * before.width, (y + 1) * before.width));
+    const shown = rows.map((row, y) => row.some(pixel => pixel !== ground) ? y : -1).filter(y => y >= 0);
+    const middle = (shown[0] + shown.at(-1)) / 2;
+    assert.ok(middle > top / 4 && middle < 3 * top / 4, `the terrain is from ${shown[0]} to ${shown.at(-1)}, the sheet begins at ${top}`);
+    const {triangles} = await view.state();
+    await view.page.focus('#tau');
+    await view.page.keyboard.press('End');
+    await until(view, s => s.camera.tau === 64);
+    assert.ok((await view.state()).triangles < triangles / 2);
+    await view.shot('sheet');
+    const after = new Uint32Array((await view.picture()).rgba.buffer), end = Math.floor(top) * before.width;
+    const changed = after.subarray(0, end).reduce((sum, pixel, i) => sum + (pixel !== pixels[i]), 0);
+    assert.ok(changed > 5000, `${changed} pixels above the sheet change`);
+    assert.deepEqual(view.problems, []);
+    await view.close();
+}));
+
 /**
  * In the page: the contrast of every text that is seen, by WCAG's formula. Where what is behind it is not known (the terrain),
  * the least of that over black and over white.

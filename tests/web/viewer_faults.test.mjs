@@ -6,6 +6,7 @@ import {tmpdir} from 'node:os';
 import {join} from 'node:path';
 import {after, before, test} from 'node:test';
 import {DESKTOP, keepingShots, launch, openPage} from './browser.mjs';
+import {differingPixels} from './picture.mjs';
 import {Service, TERRAINS} from './serve.mjs';
 
 let browser;
@@ -61,12 +62,17 @@ test('more than the service gives: its sentence is shown, and a coarser mesh com
     await until(view, shown => shown);
     assert.match(await sentence(view), /3000/);
     await view.shot('service-says-no');
+    // Nothing is claimed of nothing.
+    const claim = () => document.querySelector('#claim').innerText.trim();
+    assert.equal(await view.page.evaluate(claim), 'Nothing is shown yet.');
+    assert.equal(await view.page.evaluate(() => document.querySelector('#promise').checkVisibility()), false);
     await view.page.focus('#eps');
     await view.page.keyboard.press('End');
     await until(view, shown => !shown);
     await view.settled();
     const {triangles} = await view.state();
     assert.ok(triangles > 0 && triangles <= 3000, `${triangles}`);
+    assert.match(await view.page.evaluate(claim), /triangles[^]*Proved: /);
     await view.close();
     await service.stop();
 }));
@@ -102,6 +108,24 @@ test('damaged answers: a sentence, the mesh before stays, and the page goes on',
         assert.equal((await view.state()).triangles, triangles, `${name}: the view before`);
     }
     assert.deepEqual(view.problems.filter(p => !/ERR_|Failed to load/.test(p)), []);
+    await view.close();
+    await service.stop();
+}));
+
+test('the graphics card takes the picture away: a sentence; it is back: the same picture', keepingShots('lost', () => views, async () => {
+    const service = await Service.start(), view = await open(service, {path: '#terrain=metres&wires'}), picture = await view.picture();
+    await view.page.evaluate(() => {
+        window.card = document.querySelector('#picture').getContext('webgl2').getExtension('WEBGL_lose_context');
+        window.card.loseContext();
+    });
+    await until(view, shown => shown);
+    assert.match(await sentence(view), /graphics card/);
+    await view.page.evaluate(() => window.card.restoreContext());
+    await until(view, shown => !shown);
+    await view.settled();
+    assert.equal(differingPixels(picture, await view.picture()), 0);
+    await view.see(await camera(view, 5));
+    assert.deepEqual(view.problems, []);
     await view.close();
     await service.stop();
 }));

@@ -108,3 +108,18 @@ for (const [size, viewport] of Object.entries({desktop: DESKTOP, phone: PHONE}))
         assert.deepEqual(view.problems, []);
         await view.close();
     }));
+
+test('a height behind the mountain is faint', keepingShots('behind', () => views, async () => {
+    const view = await open('metres', DESKTOP), {camera} = await view.state();
+    await click(view, [Math.round(camera.width * 0.55), Math.round(camera.height * 0.5)]);
+    await view.page.waitForFunction(() => /\d/.test(document.querySelector('#pins text')?.textContent));
+    const opacity = () => view.page.evaluate(() => Number(getComputedStyle(document.querySelector('#pins g')).opacity));
+    await view.settled();
+    assert.equal(await opacity(), 1);
+    await view.see({eye: [camera.eye[0] + 100, 1211500, 3200], yaw: 180, pitch: -15, position: 'crs'});
+    await view.shot('behind');
+    assert.ok(await opacity() < 0.5);
+    await view.see({...camera, yaw: camera.yaw + 3});
+    assert.equal(await opacity(), 1);
+    await view.close();
+}));
