@@ -5,10 +5,9 @@
  * of its worst point. It is cut into quarters while that pays: not where its parts would be allowed little more,
  * nor where there is little to select at such an eps, nor where everything is selected anyway.
  *
- * The squares that may be seen, grown a little so that their rim is simple, are the region of the query: rings of
- * one polygon in samples, the sides of neighbours cancel (region_snap.c does the same). What is elsewhere cannot be
- * drawn. With option cover the region may be all of the terrain instead: of the same field, so that the mesh of the
- * picture is in it, and beside the picture as coarse as the gap to the frustum lets it be. */
+ * The squares that may be seen, grown a little so that their rim is simple, are the region of the query. What is
+ * elsewhere cannot be drawn. With option cover the region may be all of the terrain instead: of the same field, so
+ * that the mesh of the picture is in it, and beside the picture as coarse as the gap to the frustum lets it be. */
 #include "view.h"
 
 #include <math.h>
@@ -37,6 +36,7 @@ typedef struct builder {
     store *store;
     const store_terrain *terrain;
     store_relief relief[RQT_MAX_K + 1]; /* of the square at hand and of those around it, by level */
+    bool whole;                         /* the region will be all of the terrain; else it is of these: */
     square_list shown;
     uint32_t asked;     /* squares */
     rqt_camera cutting; /* the camera that says which squares are cut */
@@ -64,7 +64,6 @@ static rqt_square grow_square(rqt_square square, const rqt_view_piece *piece, do
 
 static bool add_square(square_list *list, rqt_square square) {
     if (list->count > 0 && is_in(square, list->items[list->count - 1])) return true;
-    while (list->count > 0 && is_in(list->items[list->count - 1], square)) list->count--;
     if (list->count == list->capacity) {
         const size_t more = list->capacity ? 2 * list->capacity : 256;
         rqt_square *items = sqlite3_realloc64(list->items, more * sizeof *items);
@@ -73,66 +72,7 @@ static bool add_square(square_list *list, rqt_square square) {
         list->capacity = more;
     }
     list->items[list->count++] = square;
-    /* Squares come in Morton order: four brothers are the last four. */
-    while (list->count >= 4) {
-        const rqt_square *last = list->items + list->count - 4;
-        const int32_t side = last[0].side, two = 2 * side;
-        if (last[0].x % two != 0 || last[0].y % two != 0) break;
-        bool brothers = true;
-        for (int i = 0; i < 4; i++)
-            brothers &= last[i].side == side && last[i].x == last[0].x + (i & 1 ? side : 0) &&
-                        last[i].y == last[0].y + (i & 2 ? side : 0);
-        if (!brothers) break;
-        list->count -= 3;
-        list->items[list->count - 1].side = two;
-    }
     return true;
-}
-
-static void put_number(uint8_t **p, const void *bytes, size_t n) {
-    memcpy(*p, bytes, n);
-    *p += n;
-}
-
-/* As well-known binary: POLYGON, in samples. */
-static uint8_t *rings_of(const square_list *list, const rqt_lattice *lattice, size_t *size) {
-    static const uint32_t polygon = 3, corners = 5;
-    static const uint8_t little = 1;
-    uint8_t *bytes = sqlite3_malloc64(9 + list->count * (4 + 5 * 16)), *p = bytes;
-    if (!bytes) return NULL;
-    const uint16_t one = 1;
-    const uint8_t order = *(const uint8_t *)&one == 1 ? little : 0;
-    uint32_t rings = 0;
-    put_number(&p, &order, 1);
-    put_number(&p, &polygon, 4);
-    p += 4;
-    for (size_t i = 0; i < list->count; i++) {
-        const rqt_square *s = &list->items[i];
-        const double x0 = s->x, y0 = s->y;
-        const double x1 = fmin(s->x + s->side, lattice->width - 1), y1 = fmin(s->y + s->side, lattice->height - 1);
-        if (x1 <= x0 || y1 <= y0) continue; /* no triangle has an area there */
-        const double ring[10] = {x0, y0, x1, y0, x1, y1, x0, y1, x0, y0};
-        put_number(&p, &corners, 4);
-        put_number(&p, ring, sizeof ring);
-        rings++;
-    }
-    memcpy(bytes + 5, &rings, 4);
-    *size = (size_t)(p - bytes);
-    return bytes;
-}
-
-static int region_of(const square_list *list, const store_terrain *t, rqt_region **region) {
-    static const rqt_placement samples = {0, 0, 1, 1};
-    rqt_geometry *geometry = NULL;
-    rqt_message why;
-    size_t size;
-    uint8_t *bytes = rings_of(list, &t->lattice, &size);
-    rqt_status status = RQT_NO_MEMORY;
-    if (bytes) status = rqt_geometry_parse(bytes, size, false, store_allocator(), &geometry, &why);
-    if (status == RQT_OK) status = rqt_region_create(geometry, &samples, &t->lattice, store_allocator(), region);
-    rqt_geometry_free(geometry);
-    sqlite3_free(bytes);
-    return status == RQT_OK ? SQLITE_OK : SQLITE_NOMEM;
 }
 
 /* --------------------------------------------------------------------------------------------------- field -- */
@@ -197,7 +137,8 @@ static rqt_field_step decide(void *context, rqt_square square, double *eps) {
             rqt_view_test_bound(v->test, &coarse, &piece, &bound);
     }
     *eps = bound.eps / v->scene.exaggeration;
-    if (!shown || add_square(&b->shown, grow_square(square, &piece, bound.distance, &b->terrain->lattice)))
+    if (!shown || b->whole ||
+        add_square(&b->shown, grow_square(square, &piece, bound.distance, &b->terrain->lattice)))
         return RQT_FIELD_LEAF;
     b->code = SQLITE_NOMEM;
     return RQT_FIELD_FAIL;
@@ -210,16 +151,20 @@ static int ended(const builder *b, rqt_status status, char **error) {
 
 int view_field(request *r, char **error) {
     view *v = r->view;
-    builder b = {.view = v, .store = r->store, .terrain = r->terrain, .error = error};
+    builder b = {
+        .view = v, .store = r->store, .terrain = r->terrain, .whole = r->cover == VIEW_TERRAIN, .error = error};
     b.cutting = v->has_band ? rqt_camera_widen(&v->camera, &v->band) : v->camera;
     rqt_field_free(v->field);
     const rqt_status status = rqt_field_create(&r->terrain->lattice, store_allocator(), decide, &b, &v->field);
     int code = ended(&b, status, error);
     v->guaranteed = v->test == RQT_VIEW_GUARANTEED;
-    if (code == SQLITE_OK && r->cover == VIEW_TERRAIN)
+    if (code == SQLITE_OK && b.whole)
         code = request_region(r, NULL, "view", &r->region, error);
     else if (code == SQLITE_OK)
-        code = region_of(&b.shown, r->terrain, &r->region);
+        code = ended(&b,
+                     rqt_region_of_squares(b.shown.items, b.shown.count, &r->terrain->lattice, store_allocator(),
+                                           &r->region),
+                     error);
     sqlite3_free(b.shown.items);
     return code;
 }

@@ -471,6 +471,7 @@ rqt_status rqt_cut_make(const rqt_patch *patch, const rqt_region *region, const 
                         const rqt_allocator *allocator, bool (*is_interrupted)(void *context), void *context,
                         rqt_cut *cut) {
     *cut = (rqt_cut){.allocator = *allocator};
+    if (!region_has_border(region)) return RQT_INVALID;
     if (patch->triangle_count == 0) return RQT_OK;
     cutting c = {.patch = patch,
                  .region = region,

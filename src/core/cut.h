@@ -62,6 +62,8 @@ typedef struct region_fine_point {
     int64_t x, y;
     int bits;
 } region_fine_point;
+/* False for regions of squares: nothing below may be asked of them. */
+bool region_has_border(const rqt_region *region);
 /* Is the point in a member with an area? On its border: yes or no. */
 bool region_holds(const rqt_region *region, const region_fine_point *p);
 /* Does a line or point of the region touch the closed triangle? */

@@ -192,6 +192,16 @@ rqt_code field_node_least(const rqt_field *field, field_node at) {
     return field->nodes[at].least;
 }
 
+bool field_are_leaves(const rqt_field *field, const field_node nine[9], rqt_code codes[9]) {
+    bool cut = false;
+    for (int i = 0; i < 9; i++) {
+        const node *n = &field->nodes[nine[i]];
+        cut |= n->kind == SPLIT;
+        codes[i] = n->least;
+    }
+    return !cut;
+}
+
 /* The quarter c of a square that is cut, else the square. */
 static inline field_node part_of(const node *nodes, field_node at, int c) {
     return nodes[at].kind == SPLIT ? nodes[at].first + (uint32_t)c : at;

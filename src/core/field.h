@@ -17,6 +17,8 @@ typedef uint32_t field_node;
 field_node field_node_at(const rqt_field *field, int32_t x, int32_t y, int32_t side);
 /* The least code of the squares that have a point in common with its interior. */
 rqt_code field_node_least(const rqt_field *field, field_node at);
+/* Is none of nine squares cut? Then, the code of each. */
+bool field_are_leaves(const rqt_field *field, const field_node nine[9], rqt_code codes[9]);
 /* Nine squares side by side, row by row, are six by six of half their side: the least code of each, column by
  * column; and the quarter c (0 NW, 1 NE, 2 SW, 3 SE) of the one in the middle with the eight around it. */
 void field_halve(const rqt_field *field, const field_node nine[9], rqt_code least[6][6]);

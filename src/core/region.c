@@ -13,11 +13,15 @@
  * A polygon whose shell has no odd piece, rounded to a line or drawn back and forth, is thin. One whose shell is
  * sound but whose rings cancel altogether (a hole that covers all) is empty.
  *
+ * Views make regions of squares instead (region_squares.c): the same questions without a border. Mode `cut` needs
+ * one, and refuses them.
+ *
  * Lists of more than a few pieces, and the list of polygons, have a tree over their boxes, all in one array. Pieces
  * keep the order of their rings, whose neighbours are near. A question costs O(log n + hits) for borders that do
  * not fold to and fro; nothing is written after rqt_region_create, so any number of threads may ask. */
 #include "cut.h"
 #include "geometry.h"
+#include "region_squares.h"
 
 #include <math.h>
 
@@ -39,6 +43,7 @@ struct rqt_region {
     size_t polygon_count, polygon_capacity;
     region_box *nodes; /* trees: of the polygons at 0, of the thin pieces at thin_tree, then of each polygon */
     size_t thin_tree;
+    region_squares squares; /* then there is nothing else */
 };
 
 /* --------------------------------------------------------------------------------------------- compile -- */
@@ -207,6 +212,32 @@ rqt_status rqt_region_create(const rqt_geometry *geometry, const rqt_placement *
     return RQT_OK;
 }
 
+rqt_status rqt_region_of_squares(const rqt_square *squares, size_t n, const rqt_lattice *lattice,
+                                 const rqt_allocator *allocator, rqt_region **region) {
+    static const rqt_geometry nothing = {0};
+    static const rqt_placement samples = {0, 0, 1, 1};
+    rqt_region *r;
+    rqt_status status = rqt_region_create(&nothing, &samples, lattice, allocator, &r);
+    *region = r;
+    for (size_t i = 0; i < n && status == RQT_OK; i++) {
+        const rqt_square s = squares[i];
+        if (s.x < lattice->width - 1 && s.y < lattice->height - 1) /* else there is no area */
+            status = region_squares_add(&r->squares, s, allocator);
+    }
+    if (status != RQT_OK) {
+        rqt_region_free(r);
+        *region = NULL;
+        return status;
+    }
+    for (size_t i = 0; i < r->squares.count; i++) {
+        const rqt_square s = region_squares_at(&r->squares, i);
+        const region_box box = {s.x * REGION_UNIT, s.y * REGION_UNIT, (s.x + s.side) * REGION_UNIT,
+                                (s.y + s.side) * REGION_UNIT};
+        grow_region_box(r, &box);
+    }
+    return RQT_OK;
+}
+
 void rqt_region_free(rqt_region *region) {
     if (!region) return;
     rqt_allocator a = region->allocator;
@@ -214,6 +245,7 @@ void rqt_region_free(rqt_region *region) {
     memory_drop(&a, region->border.items);
     memory_drop(&a, region->polygons);
     memory_drop(&a, region->nodes);
+    memory_drop(&a, region->squares.keys);
     memory_drop(&a, region);
 }
 
@@ -221,7 +253,8 @@ size_t rqt_region_bytes(const rqt_region *region) {
     size_t nodes = region_tree_size(region->polygon_count) + region_tree_size(region->thin.count);
     for (size_t i = 0; i < region->polygon_count; i++) nodes += region_tree_size(region->polygons[i].count);
     return sizeof *region + (region->thin.capacity + region->border.capacity) * sizeof *region->border.items +
-           region->polygon_capacity * sizeof *region->polygons + nodes * sizeof *region->nodes;
+           region->polygon_capacity * sizeof *region->polygons + nodes * sizeof *region->nodes +
+           region->squares.capacity * sizeof *region->squares.keys;
 }
 
 /* ------------------------------------------------------------------------------------------- questions -- */
@@ -305,7 +338,8 @@ static bool polygon_meets(const rqt_region *region, const region_polygon *polygo
     return is_inside(region, polygon, t->inner);
 }
 
-static bool polygons_meet(const rqt_region *region, const region_triangle *t) {
+static bool areas_meet(const rqt_region *region, const region_triangle *t) {
+    if (region->squares.count > 0) return region_squares_meet(&region->squares, t);
     region_search s;
     region_search_begin(&s, region->nodes, region->polygon_count, &t->box);
     for (size_t i; region_search_next(&s, &i);)
@@ -316,7 +350,7 @@ static bool polygons_meet(const rqt_region *region, const region_triangle *t) {
 bool region_area_meets(const rqt_region *region, rqt_vertex a, rqt_vertex b, rqt_vertex c) {
     if (region->all) return true;
     region_triangle t;
-    return region_triangle_init(&t, a, b, c) && polygons_meet(region, &t);
+    return region_triangle_init(&t, a, b, c) && areas_meet(region, &t);
 }
 
 bool region_thin_touches(const rqt_region *region, const region_triangle *t) {
@@ -332,7 +366,7 @@ bool rqt_region_meets(const rqt_region *region, rqt_vertex a, rqt_vertex b, rqt_
     region_triangle t;
     if (!region_triangle_init(&t, a, b, c)) return false;
     if (!region->has_box || !region_boxes_touch(&t.box, &region->box)) return false;
-    return polygons_meet(region, &t) || region_thin_touches(region, &t);
+    return areas_meet(region, &t) || region_thin_touches(region, &t);
 }
 
 static rqt_relation polygon_relation(const rqt_region *region, const region_polygon *polygon,
@@ -355,6 +389,10 @@ static bool box_of_samples(const rqt_region *region, int32_t x0, int32_t y0, int
 
 static rqt_relation area_relation(const rqt_region *region, const region_box *box) {
     rqt_relation relation = RQT_OUTSIDE;
+    if (region->squares.count > 0)
+        return region_squares_relation(&region->squares, (int32_t)(box->x0 / REGION_UNIT),
+                                       (int32_t)(box->y0 / REGION_UNIT), (int32_t)(box->x1 / REGION_UNIT),
+                                       (int32_t)(box->y1 / REGION_UNIT));
     region_search s;
     region_search_begin(&s, region->nodes, region->polygon_count, box);
     for (size_t i; region_search_next(&s, &i);) {
@@ -403,6 +441,13 @@ static bool polygon_touches(const rqt_region *region, const region_polygon *poly
 bool region_touches(const rqt_region *region, const region_box *box) {
     if (region->all) return true;
     if (!region->has_box || !region_boxes_touch(box, &region->box)) return false;
+    if (region->squares.count > 0) { /* a side that is touched has the sample behind it in the open box */
+        const int32_t end = 1 << RQT_MAX_K;
+        return region_squares_relation(&region->squares, clamp_sample(-floor_sample(-box->x0) - 1, end),
+                                       clamp_sample(-floor_sample(-box->y0) - 1, end),
+                                       clamp_sample(floor_sample(box->x1) + 1, end),
+                                       clamp_sample(floor_sample(box->y1) + 1, end)) != RQT_OUTSIDE;
+    }
     region_search s;
     region_search_begin(&s, region->nodes, region->polygon_count, box);
     for (size_t i; region_search_next(&s, &i);)
@@ -427,6 +472,9 @@ void rqt_region_grow_rectangle(rqt_region *region) {
 
 bool rqt_region_contains(const rqt_region *region, rqt_vertex sample) {
     if (region->all) return true;
+    if (region->squares.count > 0)
+        return region_squares_relation(&region->squares, sample.x - 1, sample.y - 1, sample.x + 1, sample.y + 1) ==
+               RQT_INSIDE;
     region_point p = {sample.x * REGION_UNIT, sample.y * REGION_UNIT};
     region_box place = {p.x, p.y, p.x, p.y};
     region_search polygons, pieces;
@@ -446,6 +494,10 @@ bool rqt_region_contains(const rqt_region *region, rqt_vertex sample) {
 }
 
 /* ------------------------------------------------------------------------------------- what mode `cut` asks -- */
+bool region_has_border(const rqt_region *region) {
+    return region->squares.count == 0;
+}
+
 bool region_holds(const rqt_region *region, const region_fine_point *p) {
     const region_box place = {p->floor.x, p->floor.y, p->floor.x, p->floor.y};
     region_search s;

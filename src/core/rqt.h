@@ -526,6 +526,14 @@ typedef struct rqt_placement {
 /* geometry NULL: everything. Coordinates further than 2^40 samples from the terrain are taken as that far. */
 rqt_status rqt_region_create(const rqt_geometry *geometry, const rqt_placement *placement,
                              const rqt_lattice *lattice, const rqt_allocator *allocator, rqt_region **region);
+typedef struct rqt_square {
+    int32_t x, y, side; /* lattice; side a power of two, x and y multiples of it */
+} rqt_square;
+/* The union of squares: the region that their rings would make, but quicker to make and to ask. They come in Morton
+ * order; one that holds others may come anywhere among those. RQT_INVALID for squares in another order or such as
+ * are none. What has no area on the raster is left out, and what reaches past it stays as it is. */
+rqt_status rqt_region_of_squares(const rqt_square *squares, size_t n, const rqt_lattice *lattice,
+                                 const rqt_allocator *allocator, rqt_region **region);
 void rqt_region_free(rqt_region *region);
 size_t rqt_region_bytes(const rqt_region *region); /* of memory that it takes */
 bool rqt_region_is_all(const rqt_region *region);
@@ -605,10 +613,6 @@ rqt_status rqt_rule_force_border(rqt_rule *rule, const rqt_region *region, bool 
  * and its other places. A sample on the side of a square so gets the least eps of all squares there. Views
  * (rqt_view.h) are such fields. */
 typedef struct rqt_field rqt_field;
-
-typedef struct rqt_square {
-    int32_t x, y, side; /* lattice; side a power of two, x and y multiples of it */
-} rqt_square;
 
 typedef enum rqt_field_step { RQT_FIELD_LEAF, RQT_FIELD_SPLIT, RQT_FIELD_FAIL } rqt_field_step;
 /* What becomes of a square: *eps (metres, not NaN, >= 0; infinity: nothing is asked for there) for all of it, or
@@ -758,7 +762,8 @@ typedef struct rqt_cut {
 } rqt_cut;
 
 /* patch: what a query has made of region, with triangles. Of members without an area (lines, points), whole leaves
- * stay. is_interrupted may be NULL. RQT_INTERRUPTED, RQT_NO_MEMORY: cut is empty. */
+ * stay. is_interrupted may be NULL. RQT_INTERRUPTED, RQT_NO_MEMORY, RQT_INVALID (for a region of squares): cut is
+ * empty. */
 rqt_status rqt_cut_make(const rqt_patch *patch, const rqt_region *region, const rqt_lattice *lattice,
                         const rqt_allocator *allocator, bool (*is_interrupted)(void *context), void *context,
                         rqt_cut *cut);

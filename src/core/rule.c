@@ -216,6 +216,11 @@ int32_t rule_field_threshold(const rqt_rule *rule, rqt_code code, int rank) {
     return lowered < rule->base[rank] ? lowered : rule->base[rank];
 }
 
+bool rule_takes_codes(const rqt_rule *rule, int32_t *most) {
+    *most = rule->base[0];
+    return !rule->lowers && !(rule->quantum_error > 0);
+}
+
 /* By the rule's own eps and the field. */
 static int32_t threshold_without_places(const rqt_rule *rule, rqt_vertex v, int rank) {
     if (!rule->field) return rule->base[rank];

@@ -15,6 +15,8 @@ const rqt_lattice *rule_lattice(const rqt_rule *rule);
 const rqt_field *rule_field(const rqt_rule *rule); /* NULL: none */
 /* The threshold of a vertex of this rank by the rule's own eps and a field's code. */
 int32_t rule_field_threshold(const rqt_rule *rule, rqt_code code, int rank);
+/* Is that, for every rank, the code or *most, whichever is less? */
+bool rule_takes_codes(const rqt_rule *rule, int32_t *most);
 
 /* Of a rule with a field, without places and forced vertices: chosen[i] = 1 for every vertex of the block that is
  * selected, row by row, else 0; 0 for its corners. What is selected, by error or a flag of the mask, must be

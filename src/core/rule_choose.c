@@ -12,7 +12,12 @@
  *     middle of the north side: columns 1 to 4, rows 0 to 3;  north-western centre: columns 1 to 3, rows 1 to 3;
  *
  * and what is around a quarter is nine of them. All those boxes lie in that of the cell's centre: errors that are
- * not above the threshold of its least code select nothing, and most cells end with that. */
+ * not above the threshold of its least code select nothing, and most cells end with that.
+ *
+ * Where none of the nine is cut any more, nothing is finer: six by six are then the nine twice over. A quarter's
+ * centre has the two by two that are around it, the middle of a side those of the two quarters that it lies
+ * between, and the nodes are not looked at again. Most cells are of that kind, for squares are cut about as far as
+ * meshes go. */
 #include "field.h"
 #include "rule.h"
 
@@ -23,7 +28,14 @@ typedef struct choosing {
     uint8_t *chosen;
     uint32_t n; /* vertices a side */
     uint8_t mask, all;
+    bool is_code; /* thresholds are codes, cut off at `most` */
+    int32_t most;
 } choosing;
+
+static inline int32_t threshold_of(const choosing *c, rqt_code code, int rank) {
+    if (!c->is_code) return rule_field_threshold(c->rule, code, rank);
+    return (int32_t)code < c->most ? (int32_t)code : c->most;
+}
 
 static inline bool may_be_selected(const choosing *c, uint32_t place, int32_t threshold) {
     return c->block->error[place] > threshold || (c->mask && (c->block->flags[place] & c->mask));
@@ -31,7 +43,7 @@ static inline bool may_be_selected(const choosing *c, uint32_t place, int32_t th
 
 static inline bool choose_place(choosing *c, uint32_t place, rqt_code code, int rank) {
     if (c->chosen[place]) return true; /* from the other side */
-    if (!may_be_selected(c, place, rule_field_threshold(c->rule, code, rank))) return false;
+    if (!may_be_selected(c, place, threshold_of(c, code, rank))) return false;
     c->chosen[place] = 1;
     c->all &= c->block->flags[place];
     __builtin_prefetch(&c->block->q[place]); /* is wanted when the walk is done */
@@ -80,55 +92,108 @@ static child_codes codes_of_children(const rqt_field *field, const field_node ni
                           LEAST3(of, 2, quarter[1])}};
 }
 
-static inline bool are_one_square(const field_node nine[9]) {
-    bool same = true;
-    for (int j = 1; j < 9; j++) same &= nine[j] == nine[0];
-    return same;
+static child_codes codes_among_leaves(const rqt_code nine[9]) {
+    rqt_code two[4]; /* by two */
+    for (int i = 0; i < 4; i++) {
+        const rqt_code *at = nine + (i & 1) + 3 * (i >> 1);
+        two[i] = lesser(lesser(at[0], at[1]), lesser(at[3], at[4]));
+    }
+    return (child_codes){
+        {lesser(two[0], two[1]), lesser(two[0], two[2]), lesser(two[1], two[3]), lesser(two[2], two[3])},
+        {two[0], two[1], two[2], two[3]}};
 }
 
-/* middle: the place of a cell's centre, of that rank, which is chosen; half: places from it to the sides. */
+/* Places of a cell: the middles of its sides, the centres of its quarters. */
+typedef struct cell_places {
+    uint32_t side[4], centre[4], half; /* half: from a quarter's centre to its sides */
+} cell_places;
+
+/* middle: the place of the cell's centre; half: places from it to the sides. */
+static inline cell_places places_around(const choosing *c, uint32_t middle, uint32_t half) {
+    const uint32_t n = c->n, h = half / 2;
+    return (cell_places){{middle - half * n, middle - half, middle + half, middle + half * n},
+                         {middle - h * n - h, middle - h * n + h, middle + h * n - h, middle + h * n + h},
+                         h};
+}
+
+/* May a side be selected, by the least code of the cell? A quarter's centre depends on the middles of two sides. */
+static inline bool goes_on(const choosing *c, const cell_places *at, rqt_code least, int rank) {
+    const int32_t threshold = threshold_of(c, least, rank - 1);
+    bool may = false;
+    for (int i = 0; i < 4; i++) may |= may_be_selected(c, at->side[i], threshold);
+    if (!may) return false;
+    for (int i = 0; i < 4; i++) {
+        __builtin_prefetch(&c->block->error[at->centre[i]]);
+        __builtin_prefetch(&c->block->flags[at->centre[i]]);
+        __builtin_prefetch(&c->block->flags[at->side[i]]);
+    }
+    return true;
+}
+
+/* rank: of the cell's centre, which is chosen. Bit i: the centre of the quarter i is, too. */
+static inline unsigned choose_children(choosing *c, const cell_places *at, const child_codes *codes, int rank) {
+    bool chosen[4];
+    unsigned quarters = 0;
+    for (int i = 0; i < 4; i++) chosen[i] = choose_place(c, at->side[i], codes->side[i], rank - 1);
+    if (at->half == 0) return 0;
+    for (int i = 0; i < 4; i++) {
+        if (!chosen[i & 2 ? 3 : 0] || !chosen[i & 1 ? 2 : 1] ||
+            !choose_place(c, at->centre[i], codes->quarter[i], rank - 2))
+            continue;
+        quarters |= 1U << i;
+        __builtin_prefetch(&c->block->error[at->centre[i] - at->half * c->n]);
+        __builtin_prefetch(&c->block->error[at->centre[i] + at->half * c->n]);
+    }
+    return quarters;
+}
+
+/* nine: codes of squares that are not cut, least the least of them. */
+static void choose_among_leaves(choosing *c, uint32_t middle, uint32_t half, int rank, const rqt_code nine[9],
+                                rqt_code least) {
+    const cell_places at = places_around(c, middle, half);
+    if (!goes_on(c, &at, least, rank)) return;
+    const child_codes codes = codes_among_leaves(nine);
+    const unsigned quarters = choose_children(c, &at, &codes, rank);
+    for (int i = 0; i < 4; i++) {
+        if (!(quarters >> i & 1)) continue;
+        const rqt_code *two = nine + (i & 1) + 3 * (i >> 1);
+        const int x = i & 1 ? 0 : 1, y = i & 2 ? 0 : 3; /* the column and row that is there twice */
+        const rqt_code around[9] = {two[0],     two[x], two[1],     two[y], two[y + x],
+                                    two[y + 1], two[3], two[3 + x], two[4]};
+        choose_among_leaves(c, at.centre[i], at.half, rank - 2, around, codes.quarter[i]);
+    }
+}
+
 static void choose_around(choosing *c, uint32_t middle, uint32_t half, int rank, const field_node nine[9],
                           rqt_code least) {
-    const uint32_t n = c->n, h = half / 2;
-    const uint32_t side[4] = {middle - half * n, middle - half, middle + half, middle + half * n};
-    const uint32_t centre[4] = {middle - h * n - h, middle - h * n + h, middle + h * n - h, middle + h * n + h};
-    const int32_t threshold = rule_field_threshold(c->rule, least, rank - 1);
-    bool may = false;
-    for (int i = 0; i < 4; i++) may |= may_be_selected(c, side[i], threshold);
-    /* A quarter's centre depends on the middles of two sides. */
-    if (!may) return;
-    for (int i = 0; i < 4; i++) {
-        __builtin_prefetch(&c->block->error[centre[i]]);
-        __builtin_prefetch(&c->block->flags[centre[i]]);
-        __builtin_prefetch(&c->block->flags[side[i]]);
+    rqt_code leaf[9];
+    if (field_are_leaves(c->field, nine, leaf)) {
+        choose_among_leaves(c, middle, half, rank, leaf, least);
+        return;
     }
-
-    const bool is_one = are_one_square(nine);
-    const child_codes codes = is_one ? (child_codes){{least, least, least, least}, {least, least, least, least}}
-                                     : codes_of_children(c->field, nine);
-    bool chosen[4];
-    for (int i = 0; i < 4; i++) chosen[i] = choose_place(c, side[i], codes.side[i], rank - 1);
-    if (half == 1) return;
-    bool goes_on[4];
+    const cell_places at = places_around(c, middle, half);
+    if (!goes_on(c, &at, least, rank)) return;
+    const child_codes codes = codes_of_children(c->field, nine);
+    const unsigned quarters = choose_children(c, &at, &codes, rank);
     for (int i = 0; i < 4; i++) {
-        goes_on[i] = chosen[i & 2 ? 3 : 0] && chosen[i & 1 ? 2 : 1] &&
-                     choose_place(c, centre[i], codes.quarter[i], rank - 2);
-        if (!goes_on[i]) continue;
-        __builtin_prefetch(&c->block->error[centre[i] - h * n]);
-        __builtin_prefetch(&c->block->error[centre[i] + h * n]);
-    }
-    for (int i = 0; i < 4; i++) {
-        if (!goes_on[i]) continue;
+        if (!(quarters >> i & 1)) continue;
         field_node around[9];
-        if (!is_one) field_around_quarter(c->field, nine, i, around);
-        choose_around(c, centre[i], h, rank - 2, is_one ? nine : around, codes.quarter[i]);
+        field_around_quarter(c->field, nine, i, around);
+        choose_around(c, at.centre[i], at.half, rank - 2, around, codes.quarter[i]);
     }
 }
 
 uint8_t rule_choose(const rqt_rule *rule, const rqt_block_place *place, const rqt_block *block, uint8_t mask,
                     uint8_t *chosen) {
     const uint32_t n = (UINT32_C(1) << block->k) + 1, half = n / 2, middle = half * n + half;
-    choosing c = {rule, rule_field(rule), block, chosen, n, mask, 0xFF};
+    choosing c = {.rule = rule,
+                  .field = rule_field(rule),
+                  .block = block,
+                  .chosen = chosen,
+                  .n = n,
+                  .mask = mask,
+                  .all = 0xFF};
+    c.is_code = rule_takes_codes(rule, &c.most);
     memset(chosen, 0, (size_t)n * n);
     if (block->k == 0) return c.all;
     field_node nine[9];

@@ -109,9 +109,9 @@ export class Viewer {
         this.figures.clear();
         this.isMeshMissing = false;
         this.stage = null;
-        this.scene = createScene(terrain.terrain.crs);
+        this.scene = createScene(terrain.terrain);
         // The same object for the same terrain: by this the worker knows it.
-        terrain.forWorker ||= {isSpace: this.scene.isSpace, metre: this.scene.metre};
+        terrain.forWorker ||= this.scene.how;
         this.camera = new Camera(this.scene);
         this.extent = extentOf(this.scene, terrain);
         this.orbit = new Orbit(this.camera, at => this.pointAt(at), 4 * this.extent.radius);

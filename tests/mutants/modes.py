@@ -66,7 +66,7 @@ MUTANTS = [
     ("border: a clamped triangle is mixed only if its children are", "src/core/border.c",
      "if (!straddles && first == WHOLE", "if (first == WHOLE", "test_core_rule", "borders_force_what_is_mixed_and_no_more"),
     ("border: lines have one", "src/core/region.c",
-     "return region_triangle_init(&t, a, b, c) && polygons_meet(region, &t);", "return rqt_region_meets(region, a, b, c) && region_triangle_init(&t, a, b, c);",
+     "return region_triangle_init(&t, a, b, c) && areas_meet(region, &t);", "return rqt_region_meets(region, a, b, c) && region_triangle_init(&t, a, b, c);",
      "test_core_rule", "borders_force_what_is_mixed_and_no_more"),
     ("border: F24 a rectangle thinner than a cell vanishes", "src/core/region.c",
      "    box->x0 = floor_sample(box->x0) * REGION_UNIT;\n", "    box->x0 = -floor_sample(-box->x0) * REGION_UNIT;\n",

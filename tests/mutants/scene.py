@@ -27,7 +27,7 @@ MUTANTS = [
      SQL, "helens 2: what is drawn is within tau"),
     ("scene: a rule without its field", "ext/detail.c", "if (status == RQT_OK && r->view) status = rqt_rule_set_field(r->options.rule, r->view->field);", "",
      SQL, "what is drawn is within tau"),
-    ("scene: what may be seen is left out of the region", "ext/view_field.c", "if (!shown || add_square", "if (!shown || square.side < 9 || add_square",
+    ("scene: what may be seen is left out of the region", "ext/view_field.c", "if (!shown || b->whole ||", "if (!shown || square.side < 9 ||",
      SQL, "every sample that is drawn has its triangle"),
     ("camera: yaw goes to the west", "ext/camera.c", "combine(sin(yaw), east", "combine(-sin(yaw), east", SQL, "turned by 35 degrees in its picture"),
     ("camera: pitch is downward", "ext/camera.c", "sin(pitch), up, direction", "-sin(pitch), up, direction", SQL, "something is seen"),

@@ -3,14 +3,14 @@
 PAGE, STREAM = "web/page.test.mjs", "web/stream.test.mjs"
 
 MUTANTS = [
-    ("viewer: feet are metres", "src/web/scene.js", "const metre = units.length ? Number(units[units.length - 1][1]) : 1;", "const metre = 1;", PAGE, "a CRS in feet"),
-    ("viewer: the base's unit is the unit", "src/web/scene.js", "Number(units[units.length - 1][1])", "Number(units[0][1])", PAGE, "a CRS in feet"),
+    ("viewer: feet are metres", "src/web/scene.js", "{lonlat: false, metre: terrain.metre}", "{lonlat: false}", PAGE, "a CRS in feet is metres in the scene"),
     ("viewer: yaw goes the other way", "src/web/camera.js", "add(scaled(east, Math.sin(yaw)), north, Math.cos(yaw))", "add(scaled(east, -Math.sin(yaw)), north, Math.cos(yaw))", PAGE, "looks to the north"),
     ("viewer: the picture is square", "src/web/camera.js", "x: dot(from, right) / (tangent * this.width / this.height)", "x: dot(from, right) / tangent", PAGE, "a direction of the picture"),
     ("viewer: places are rounded to metres", "src/web/camera.js", "const [x, y, height] = this.place, digits = this.scene.isSpace ? 9 : 4;", "const [x, y, height] = this.place, digits = 4;", PAGE, "a camera is what its JSON says"),
     ("viewer: a tilt lets go", "src/web/orbit.js", "camera.hold(anchor, this.at);", "camera.hold(anchor, [0, 0]);", PAGE, "the ground that is held"),
     ("viewer: zooming is for the middle", "src/web/orbit.js", "camera.hold(point, held);", "camera.hold(point, [0, 0]);", PAGE, "the ground that is held"),
     ("viewer: zooming out has no end", "src/web/orbit.js", "Math.min(factor, most)", "factor", PAGE, "nobody gets lost"),
+    ("viewer: every ellipsoid is that of WGS 84", "src/web/scene.js", "semiMajor: terrain.semi_major, inverseFlattening: terrain.inverse_flattening", "semiMajor: 6378137", PAGE, "a CRS in feet is metres in the scene"),
     ("viewer: the Earth is flat", "src/web/orbit.js", "    if (!scene.isSpace) {\n        camera.eye = add(eye, by);", "    if (true) {\n        camera.eye = add(eye, by);", PAGE, "level flight keeps its height"),
     ("viewer: the terrain may stick out", "src/web/camera.js", "high - low < 1.8 && ", "", PAGE, "the whole terrain is in the picture"),
     ("viewer: boxes have no top", "src/web/geometry.js", "if (value > boxes[at + 3 + axis]) boxes[at + 3 + axis] = value;", "if (value > boxes[at + 3 + axis] && axis < 2) boxes[at + 3 + axis] = value;", PAGE, "picking"),

@@ -13,9 +13,8 @@ import {add, createScene, dot, length, subtract, unit} from '../../src/web/scene
 import {readFragment, writeFragment} from '../../src/web/state.js';
 import {Dice} from './oracle.mjs';
 
-const DEGREES = 'GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],UNIT["degree",0.0174532925199433]]';
-const FEET = 'PROJCS["feet",GEOGCS["NAD83",UNIT["degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],UNIT["US survey foot",0.3048006096012192]]';
-const SCENES = {degrees: createScene(DEGREES), feet: createScene(FEET), bare: createScene('')};
+const DEGREES = {lonlat: 1, semi_major: 6378137, inverse_flattening: 298.257223563}, FEET = {lonlat: 0, metre: 0.3048006096012192};
+const SCENES = {degrees: createScene(DEGREES), feet: createScene(FEET), bare: createScene({})};
 const near = (a, b, most, why) => assert.ok(a.every((v, i) => Math.abs(v - b[i]) <= most), `${why}: ${a} and ${b}`);
 
 const dice = new Dice(20260);
@@ -44,12 +43,16 @@ function ridges(n, place) {
     return mesh;
 }
 
-test('a CRS in feet is metres in the scene, one in degrees is geocentric', () => {
+test('a CRS in feet is metres in the scene, one in degrees is geocentric on its own ellipsoid', () => {
     near(SCENES.feet.point([1000, 2000, 30]), [304.8006096012192, 609.6012192024384, 30], 1e-9, 'feet');
-    assert.equal(SCENES.degrees.isSpace, true);
-    assert.equal(SCENES.bare.metre, 1);
-    assert.equal(createScene(`COMPD_CS["x",${DEGREES},VERT_CS["h",UNIT["metre",1]]]`).isSpace, true);
-    assert.equal(createScene(`COMPD_CS["x",${FEET},VERT_CS["h",UNIT["metre",1]]]`).metre, 0.3048006096012192);
+    near(SCENES.bare.point([1000, 2000, 30]), [1000, 2000, 30], 0, 'no CRS');
+    near(SCENES.degrees.point([90, 0, 30]), [0, 6378167, 0], 1e-8, 'equator');
+    const clarke = createScene({lonlat: 1, semi_major: 6378206.4, inverse_flattening: 294.9786982139006}), sphere = createScene({lonlat: 1, semi_major: 6371000, inverse_flattening: 0});
+    near(clarke.point([-100, 90, 30]), [0, 0, 6356583.8 + 30], 1e-6, 'Clarke 1866, pole');
+    near(clarke.place(clarke.point([-100, 40, 30])), [-100, 40, 30], 1e-8, 'Clarke 1866, back');
+    near(sphere.point([0, 90, 30]), [0, 0, 6371030], 1e-8, 'sphere, pole');
+    near(new Place(clarke.how).positionsOf({x0: 0, y0: 90, dx: 1, dy: -1, z0: 0, d: 1, numerator: 1, denominator: 1, scale: 1, offset: 0, vertexCount: 1,
+        col: [0], row: [0], q: [7]}, [0, 0, 6356583.8]), [0, 0, 7], 1e-5, 'Clarke 1866, a mesh');
 });
 
 test('a camera is what its JSON says: read again it asks the same', () => {
