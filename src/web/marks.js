@@ -1,7 +1,7 @@
 // marks.js - what is marked on the terrain: pins with their heights, and the line of a profile.
 
-import {Line2} from 'three/addons/lines/Line2.js';
-import {LineGeometry} from 'three/addons/lines/LineGeometry.js';
+import {LineSegments2} from 'three/addons/lines/LineSegments2.js';
+import {LineSegmentsGeometry} from 'three/addons/lines/LineSegmentsGeometry.js';
 import {LineMaterial} from 'three/addons/lines/LineMaterial.js';
 import {subtract} from './scene.js';
 
@@ -30,7 +30,7 @@ export class Marks {
         Object.assign(this, {overlay, pins: new Map(), lines: []});
         // Twice: where the mesh hides it, faintly.
         for (const [opacity, depthTest] of [[0.3, false], [1, true]]) {
-            const line = new Line2(new LineGeometry(), new LineMaterial({linewidth: 3, transparent: true, opacity, depthTest}));
+            const line = new LineSegments2(new LineSegmentsGeometry(), new LineMaterial({linewidth: 3, transparent: true, opacity, depthTest}));
             line.frustumCulled = false;
             line.visible = false;
             line.renderOrder = 2;
@@ -56,14 +56,15 @@ export class Marks {
         this.pins.set(name, {point, node});
     }
 
-    /** @param points of the scene, in runs: a void interrupts the line; none: no line */
-    line(points) {
-        const [origin] = points, positions = points.flatMap(point => subtract(point, origin));
+    /** @param runs of two or more points of the scene: a void interrupts the line; none: no line */
+    line(runs) {
+        const origin = runs[0]?.[0], place = point => subtract(point, origin);
+        const positions = runs.flatMap(run => run.slice(1).flatMap((point, i) => [...place(run[i]), ...place(point)]));
         for (const line of this.lines) {
-            line.visible = points.length > 1;
+            line.visible = runs.length > 0;
             if (!line.visible) continue;
             line.geometry.dispose();
-            line.geometry = new LineGeometry();
+            line.geometry = new LineSegmentsGeometry();
             line.geometry.setPositions(positions);
             line.position.set(...origin);
         }

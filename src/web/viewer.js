@@ -92,8 +92,9 @@ export class Viewer {
         const chosen = this.terrains.find(({id}) => id === terrain) || this.terrain || this.terrains[0];
         if (terrain && chosen.id !== terrain) this.fail(`There is no terrain ${terrain}.`);
         this.open(chosen);
+        this.camera.exaggeration = this.settings.exaggeration;
         if (camera) {
-            this.camera.read({...camera, exaggeration: this.settings.exaggeration});
+            this.camera.read(camera);
             this.glide.stop();
             this.isStandTaken = true;
         }
@@ -107,6 +108,7 @@ export class Viewer {
         this.measure.clear();
         this.layer.clear();
         this.figures.showNothing();
+        this.isMeshMissing = false;
         this.stage = null;
         this.scene = createScene(terrain.terrain);
         // The same object for the same terrain: by this the worker knows it.
@@ -123,7 +125,7 @@ export class Viewer {
         document.title = `${terrain.id} \u2013 rqt`;
     }
 
-    /** The heights of the ground as they are drawn. */
+    /** The heights of the ground as they are drawn; 0 where all is void. */
     heights() {
         const {min_z: lowest, max_z: highest} = this.terrain.terrain;
         return [lowest * this.settings.exaggeration, highest * this.settings.exaggeration];
@@ -304,13 +306,17 @@ export class Viewer {
         element('bare').href = stage.wish.path;
         this.paint();
         if (this.isMeshMissing) this.fail('');
+        this.isMeshMissing = false;
         this.redraw();
         while (this.layer.isMoving) await new Promise(resolve => requestAnimationFrame(resolve));
     }
 
-    /** Says what is wrong; '': nothing is. What is said of a mesh that does not come goes when one does. */
+    /** Says what is wrong; '': nothing is. What is said while a mesh does not come goes when one does. */
     fail(sentence, isMeshMissing = false) {
-        this.isMeshMissing = isMeshMissing;
+        if (isMeshMissing) {
+            this.isMeshMissing = true;
+            this.figures.showMissing();
+        }
         element('problem').hidden = !sentence;
         element('problem').querySelector('p').textContent = sentence;
     }
@@ -349,7 +355,9 @@ export class Viewer {
         this.layer.uniforms.hazeDistance.value = extent.radius * 3;
         if (!this.isLost) this.picture.draw(camera, Number.isNaN(clearance) ? extent.radius : clearance, extent);
         frames.cost = performance.now() - started;
-        this.stream.want(this.wish());
+        const wish = this.wish();
+        this.stream.want(wish);
+        this.figures.showWait(this.stage?.wish.path !== wish.path && !this.isMeshMissing);
         const {clientWidth, clientHeight} = element('picture');
         this.marks.place(camera, clientWidth, clientHeight, (x, y, depth) => this.hides(x, y, depth));
         element('needle').setAttribute('transform', `rotate(${-camera.yaw})`);

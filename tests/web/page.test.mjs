@@ -2,12 +2,13 @@
 import assert from 'node:assert/strict';
 import {test} from 'node:test';
 import {Camera, lookAtAll} from '../../src/web/camera.js';
+import {promiseOf} from '../../src/web/figures.js';
 import {Fly} from '../../src/web/fly.js';
 import {CHUNK, buildGeometry, edgesOf} from '../../src/web/geometry.js';
 import {Orbit} from '../../src/web/orbit.js';
 import {groundBelow, pickPoint} from '../../src/web/pick.js';
 import {Place} from '../../src/web/place.js';
-import {ticksOf} from '../../src/web/profile.js';
+import {runsOf, ticksOf} from '../../src/web/profile.js';
 import {add, createScene, dot, length, subtract, unit} from '../../src/web/scene.js';
 import {readFragment, writeFragment} from '../../src/web/state.js';
 import {Dice} from './oracle.mjs';
@@ -222,6 +223,23 @@ test('ticks are round numbers within the axis', () => {
     }
 });
 
+test('a void ends a run of a profile, and a single height is none', () => {
+    const rows = [5, 6, null, 7, null, null, 8, 9, 10].map((z, i) => [i, i, 0, z]);
+    assert.deepEqual(runsOf(rows).map(run => run.map(([, , , z]) => z)), [[5, 6], [8, 9, 10]]);
+});
+
+test('what is proved is never less than what was rounded, and nothing of no triangle', () => {
+    const answer = (ask, asked, achieved) => ({wish: {ask, asked}, told: {achievedEps: achieved, achievedTau: achieved, guaranteed: 1}, mesh: {triangleCount: 9}});
+    const text = (...all) => promiseOf(...all).text.replaceAll('\u00a0', ' ');
+    assert.match(text(answer('range', 0, 0), 0), /^Proved: every sample is met exactly\.$/);
+    assert.match(text(answer('range', 0, 0), 0.00048828125), /^Proved: nowhere more than 0\.00049 m from any sample\.$/);
+    assert.match(text(answer('range', 5, 5), 0.00048828125), /^Proved: nowhere more than 5 m from any sample\.$/);
+    assert.match(text(answer('range', 5, 10.5), 0), /10\.5 m from any sample\. 5 m would take too many triangles\.$/);
+    assert.match(text(answer('view', 1, 1), 0), /off by more than 1 px\.$/);
+    assert.ok(promiseOf(answer('view', 1, 1)).isProved);
+    for (const ask of ['view', 'range']) assert.equal(promiseOf({...answer(ask, 1, 1), mesh: {triangleCount: 0}}).isProved, false);
+});
+
 test('the address says what is shown, and nonsense in it nothing', () => {
     const state = {terrain: 'a b/&=c', eye: [-71.25, 44.5, 1234.567], yaw: 12.3456, pitch: -8, fovy: 40, exaggeration: 2.5, ask: 'view', tau: 1.5, colour: 'error', wires: true, mode: 'fly'};
     const {camera, ...read} = readFragment(writeFragment(state));
@@ -230,4 +248,5 @@ test('the address says what is shown, and nonsense in it nothing', () => {
     assert.equal(read.capture, false);
     const nonsense = readFragment('#eye=1,2&tau=-3&eps=many&ask=all&colour=__proto__&mode=&exaggeration=NaN');
     for (const [key, value] of Object.entries(nonsense)) assert.ok(value === undefined || value === false, `${key}: ${value}`);
+    for (const eye of [',,', '1,,2', '1e300,0,0', '1,2,NaN']) assert.equal(readFragment(`#eye=${eye}`).camera, undefined, eye);
 });

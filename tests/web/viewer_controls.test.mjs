@@ -109,6 +109,41 @@ test('keys fly, colour, draw edges and help', keepingShots('keys', () => views, 
     await view.close();
 }));
 
+test('keys move the camera after a pointer has pressed a control, and not behind the help', keepingShots('keys after pointer', () => views, async () => {
+    const view = await open(), {page} = view, {keyboard} = page;
+    const moved = async key => {
+        const {camera: from} = await view.state();
+        await keyboard.down(key);
+        await view.until(from => JSON.stringify(window.rqtViewer.state().camera.eye) !== JSON.stringify(from), Boolean, from.eye);
+        await keyboard.up(key);
+    };
+    for (const control of ['#tau', '#wires', '#colour [value=plain]', '#mode [value=fly]']) {
+        await page.locator(control).click();
+        await moved('w');
+    }
+    await moved('ArrowUp');
+    assert.equal((await view.state()).mode, 'fly');
+    await view.settled();
+    const {camera} = await view.state();
+    await keyboard.press('?');
+    await page.waitForSelector('#help[open]');
+    await keyboard.down('w');
+    await page.evaluate(() => new Promise(resolve => requestAnimationFrame(() => requestAnimationFrame(resolve))));
+    await keyboard.up('w');
+    assert.deepEqual((await view.state()).camera, camera);
+    assert.deepEqual(view.problems, []);
+    await view.close();
+}));
+
+test('an address that names an exaggeration alone is asked with it', keepingShots('address exaggeration', () => views, async () => {
+    const view = await open();
+    await view.page.evaluate(() => { location.hash = '#terrain=metres&exaggeration=5'; });
+    await until(view, s => s.exaggeration === 5);
+    assert.equal(JSON.parse(view.lastAsked('/view').parameters.camera).exaggeration, 5);
+    assert.deepEqual(view.problems, []);
+    await view.close();
+}));
+
 test('an address keeps a view: loaded again it is the same picture', keepingShots('address', () => views, async () => {
     const view = await open('degrees');
     await view.see({eye: [-71.42, 44.12, 2600], yaw: 31, pitch: -14, fovy: 50, position: 'crs'});

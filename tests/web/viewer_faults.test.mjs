@@ -1,11 +1,12 @@
 // viewer_faults.test.mjs - what the page does when the service says no, says nonsense, or is gone.
 import assert from 'node:assert/strict';
 import {execFileSync} from 'node:child_process';
-import {mkdtempSync, rmSync} from 'node:fs';
+import {mkdtempSync, rmSync, writeFileSync} from 'node:fs';
 import {tmpdir} from 'node:os';
 import {join} from 'node:path';
 import {after, before, test} from 'node:test';
 import {DESKTOP, keepingShots, launch, openPage} from './browser.mjs';
+import {BUILD} from './packages.mjs';
 import {differingPixels} from './picture.mjs';
 import {Service, TERRAINS} from './serve.mjs';
 
@@ -44,6 +45,15 @@ test('the service is gone: a sentence; it is back: the page goes on', keepingSho
     await view.setCamera(lost);
     await until(view, shown => shown);
     assert.match(await sentence(view), /does not answer/);
+    const claim = () => view.page.evaluate(() => document.querySelector('#promise').textContent);
+    assert.match(await claim(), /^Nothing is proved/);
+    await view.page.selectOption('#terrain', 'degrees');
+    assert.doesNotMatch(await claim(), /^Proved/);
+    assert.equal(await view.page.textContent('#triangles'), '\u2013');
+    await view.page.selectOption('#terrain', 'metres');
+    await view.setCamera(lost);
+    await view.page.mouse.click(500, 420);
+    await until(view, shown => shown);
     await view.shot('service-gone');
     service = await Service.start({port});
     await until(view, shown => !shown);
@@ -137,6 +147,20 @@ test('a terrain that is not there: a sentence, and another one', keepingShots('a
     assert.ok((await view.state()).triangles > 100);
     await view.close();
     await service.stop();
+}));
+
+test('a terrain that is all void: it says so, without a complaint', keepingShots('all void', () => views, async () => {
+    const folder = mkdtempSync(join(tmpdir(), 'rqt_web_')), database = join(folder, 'void.gpkg'), raster = join(folder, 'void.asc');
+    writeFileSync(raster, `ncols 3\nnrows 3\nxllcorner 0\nyllcorner 0\ncellsize 10\nNODATA_value -1\n${'-1 -1 -1\n'.repeat(3)}`);
+    execFileSync(join(BUILD, 'rqt'), ['import', '--name', 'void', raster, database], {stdio: 'pipe'});
+    const service = await Service.start({databases: [database]}), view = await open(service, {path: ''});
+    assert.match(await view.page.textContent('#facts'), /all void/);
+    assert.match(await view.page.textContent('#promise'), /nothing to draw/);
+    assert.equal((await view.state()).triangles, 0);
+    assert.deepEqual(view.problems, []);
+    await view.close();
+    await service.stop();
+    rmSync(folder, {recursive: true});
 }));
 
 test('databases without a terrain: a sentence', keepingShots('nothing', () => views, async () => {
