@@ -281,7 +281,7 @@ static void call_with_format(sqlite3_context *result, bool is_view, int count, s
     sqlite3_value *arguments[5] = {NULL};
     mesh_bytes mesh;
     char *error = NULL;
-    memcpy(arguments, given, (size_t)count * sizeof *given);
+    for (int i = 0; i < count; i++) arguments[i] = given[i];
     const int code = mesh_bytes_make(sqlite3_user_data(result), is_view, arguments, &mesh, &error);
     if (code != SQLITE_OK)
         scalar_error(result, is_view ? "rqt_view_mesh" : "rqt_mesh", code, error);

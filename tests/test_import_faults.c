@@ -113,6 +113,8 @@ static void bad_options_get_a_sentence(void **unused) {
     import_options o = defaults();
     o.name = "no spaces";
     import_refused(source, db, &o, "no name for a terrain");
+    o.name = "..";
+    import_refused(source, db, &o, "no name for a terrain");
     o = defaults();
     o.k = 9;
     import_refused(source, db, &o, "1 to 8");

@@ -95,7 +95,7 @@ static int set_option(import_options *o, int option) {
     switch (option) {
     case NAME:
         if (!store_name_is_valid(optarg))
-            return cli_usage("--name %s: a name has 1 to 63 letters, digits, _ . or -", optarg);
+            return cli_usage("--name %s: a name has 1 to 63 letters, digits, _ . or -, and is not . or ..", optarg);
         o->name = optarg;
         return CLI_OK;
     case BLOCK:

@@ -82,7 +82,8 @@ static bool check_options(const import_job *job, int count) {
     import_unit unit;
     if (count < 1) return import_refuse(job, "no source to import");
     if (o->name && !store_name_is_valid(o->name))
-        return import_refuse(job, "'%s' is no name for a terrain: 1 to 63 letters, digits, _ . -", o->name);
+        return import_refuse(job, "'%s' is no name for a terrain: 1 to 63 letters, digits, _ . -, but not . or ..",
+                             o->name);
     if (o->k < 1 || o->k > RQT_MAX_BLOCK_K)
         return import_refuse(job, "blocks of 2^%d + 1 samples a side: the exponent is 1 to %d", o->k,
                              RQT_MAX_BLOCK_K);

@@ -225,7 +225,7 @@ int store_write_minimal(sqlite3 *db, const char *name, bool (*progress)(void *co
                         char **error);
 size_t store_minimal_bytes(const rqt_lattice *lattice, int k, bool has_voids);
 
-/* Is this a name a terrain may have? */
+/* Is this a name a terrain may have? Not `.` and `..`: in a URL they are no names. */
 bool store_name_is_valid(const char *name);
 
 #ifdef __cplusplus

@@ -54,7 +54,7 @@ bool store_name_is_valid(const char *name) {
                           c == '.' || c == '-';
         if (!fits || n >= 63) return false;
     }
-    return n > 0;
+    return n > 0 && strcmp(name, ".") != 0 && strcmp(name, "..") != 0;
 }
 
 static char *text_column(sqlite3_stmt *row, int column) {

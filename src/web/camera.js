@@ -121,41 +121,69 @@ export class Camera {
     }
 }
 
-/**
- * Stands the camera so that the whole terrain is in the picture, seen from the south, or from above where much of the
- * Earth is to be seen.
- * @param box [west, south, east, north] of the CRS
- * @param heights [lowest, highest], exaggerated
- */
-export function lookAtAll(camera, box, heights) {
-    const {scene} = camera, [x0, y0, x1, y1] = box, span = scene.isSpace ? Math.max(x1 - x0, y1 - y0) : 0;
-    const middle = [(x0 + x1) / 2, (y0 + y1) / 2, (heights[0] + heights[1]) / 2], points = [];
+/** The points between which a terrain is, as geometry.js has those of a mesh. @param box, heights as below */
+function pointsBetween(scene, [x0, y0, x1, y1], heights) {
+    const origin = scene.point([(x0 + x1) / 2, (y0 + y1) / 2, heights[0]]), positions = [];
     for (let i = 0; i <= 8; i++)
         for (let j = 0; j <= 8; j++)
             for (const height of heights)
-                points.push(scene.point([x0 + (x1 - x0) * i / 8, y0 + (y1 - y0) * j / 8, height]));
-    const {north, up} = scene.axes(middle), target = scene.point(middle);
-    const pitch = -(38 + clamp((span - 5) / 30, 0, 1) * 46) * DEGREE;
-    const direction = add(scaled(north, Math.cos(pitch)), up, Math.sin(pitch));
-    let aim = 0; // degrees that the camera looks above the target
+                positions.push(...subtract(scene.point([x0 + (x1 - x0) * i / 8, y0 + (y1 - y0) * j / 8, height]), origin));
+    return {origin, positions};
+}
+
+/** What of the picture points take: [left, right, bottom, top] by the tangents of the angles; null when one is behind. */
+function tangentsOf(camera, {origin, positions}) {
+    const {right, up, forward} = camera.basis(), [x, y, z] = subtract(origin, camera.eye);
+    const found = [Infinity, -Infinity, Infinity, -Infinity];
+    for (let i = 0; i < positions.length; i += 3) {
+        const a = x + positions[i], b = y + positions[i + 1], c = z + positions[i + 2];
+        const depth = a * forward[0] + b * forward[1] + c * forward[2];
+        if (!(depth > 0)) return null;
+        const across = (a * right[0] + b * right[1] + c * right[2]) / depth, high = (a * up[0] + b * up[1] + c * up[2]) / depth;
+        if (across < found[0]) found[0] = across;
+        if (across > found[1]) found[1] = across;
+        if (high < found[2]) found[2] = high;
+        if (high > found[3]) found[3] = high;
+    }
+    return found;
+}
+
+/**
+ * Stands the camera so that the whole terrain is in the middle of the picture, seen from the south; in a portrait from
+ * higher up, and from above where much of the Earth is to be seen.
+ * @param box [west, south, east, north] of the CRS
+ * @param heights [lowest, highest], exaggerated
+ * @param mesh {origin, positions} of geometry.js: what is to be in the picture; null: all that may be between the heights
+ * @param share of the picture's height, about its middle, that is not covered
+ */
+export function lookAtAll(camera, box, heights, mesh = null, share = 1) {
+    const {scene} = camera, [x0, y0, x1, y1] = box, span = scene.isSpace ? Math.max(x1 - x0, y1 - y0) : 0;
+    const points = mesh || pointsBetween(scene, box, heights);
+    const middle = [(x0 + x1) / 2, (y0 + y1) / 2, (heights[0] + heights[1]) / 2], target = scene.point(middle);
+    const most = Math.tan(camera.fovy / 2 * DEGREE), aspect = camera.width / camera.height;
+    const steep = 38 + 27 * clamp(share / aspect - 1, 0, 1);
+    const pitch = -(steep + clamp((span - 5) / 30, 0, 1) * (84 - steep)) * DEGREE;
+    const {east, north, up} = scene.axes(middle);
+    const direction = add(scaled(north, Math.cos(pitch)), up, Math.sin(pitch)), above = cross(east, direction);
+    let aside = 0, higher = 0; // of the eye, by its distance
     const seen = distance => {
-        camera.set(add(target, direction, -distance), direction);
-        camera.turn(0, aim);
-        const at = points.map(point => camera.project(point)), ys = at.map(one => one ? one.y : Infinity);
-        const low = Math.min(...ys), high = Math.max(...ys);
-        return {middle: (low + high) / 2, fits: high - low < 1.8 && at.every(one => one && Math.abs(one.x) < 0.93)};
+        camera.set(add(add(add(target, direction, -distance), east, aside * distance), above, higher * distance), direction);
+        camera.yaw = 0;
+        return tangentsOf(camera, points);
     };
-    // What is near is large: so the picture's middle is not the target's. Each round gets nearer to it.
-    for (let round = 0; round < 4; round++) {
+    const fits = found => found && found[1] - found[0] < 1.86 * most * aspect && found[3] - found[2] < 1.8 * most * share;
+    // What is near is large: so the middle of the points is not that of their picture. Each round gets nearer to it.
+    for (let round = 0; round < 6; round++) {
         let near = 0, far = 1;
-        while (!seen(far).fits && far < 1e10) far *= 2;
+        while (!fits(seen(far)) && far < 1e10) far *= 2;
         for (let halving = 0; halving < 24; halving++) {
             const half = (near + far) / 2;
-            if (seen(half).fits) far = half;
+            if (fits(seen(half))) far = half;
             else near = half;
         }
-        aim += Math.atan(seen(far).middle * Math.tan(camera.fovy / 2 * DEGREE)) / DEGREE;
+        const [left, right, bottom, top] = seen(far);
+        if (round === 5) break;
+        aside += (left + right) / 2;
+        higher += (bottom + top) / 2;
     }
-    camera.set(camera.eye, direction);
-    camera.turn(0, aim);
 }

@@ -101,11 +101,13 @@ export class Controls {
     }
 
     key(event, isDown) {
-        const usesArrows = event.target.closest?.('input, select, [role=tablist]');
+        const isArrow = event.code.startsWith('Arrow'), {target} = event;
+        const isTheirs = target.closest?.('select, dialog') || isArrow && target.closest?.('input, [role=tablist]') ||
+            event.code.startsWith('Page') && target.matches?.('[type=range]');
         if (!isDown) this.held.delete(event.code);
-        else if (!usesArrows && !event.ctrlKey && !event.metaKey && !event.altKey) this.held.add(event.code);
+        else if (!isTheirs && !event.ctrlKey && !event.metaKey && !event.altKey) this.held.add(event.code);
         this.isFast = event.shiftKey;
-        if (isDown && !usesArrows && event.code.startsWith('Arrow')) event.preventDefault();
+        if (isDown && !isTheirs && isArrow) event.preventDefault();
     }
 
     /** Moves by the keys that are held; is any? */

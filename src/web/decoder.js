@@ -1,7 +1,7 @@
 // decoder.js - the worker of the page: bytes of the service in, what can be shown out, so that the picture never waits.
 //
-// A job is {id, terrain, bytes, exaggeration, origin, withEdges, withMorph}. terrain: {isSpace, metre} when
-// it is another than before, else null. bytes: a mesh in wire format, or null: the mesh of the job before, shown otherwise.
+// A job is {id, terrain, bytes, exaggeration, origin, withEdges, withMorph}. terrain: how its places
+// are taken (place.js) when it is another than before, else null. bytes: a mesh in wire format, or null: the mesh of the job before, shown otherwise.
 // The answer is {id, mesh, geometry, morph, milliseconds} or {id, problem}, a sentence.
 
 import {buildGeometry, buildMorph} from './geometry.js';
@@ -19,7 +19,7 @@ function run({terrain: other, bytes, exaggeration, origin, withEdges, withMorph}
         terrain = other;
         last = null;
     }
-    const placeOf = exaggerated => new Place({lonlat: terrain.isSpace, metre: terrain.metre, exaggeration: exaggerated});
+    const placeOf = exaggerated => new Place({...terrain, exaggeration: exaggerated});
     const mesh = bytes ? decodeMesh(bytes, {leaves: true}) : last.mesh, place = placeOf(exaggeration), before = last;
     last = {mesh, exaggeration};
     const isMoving = withMorph && before && (before.mesh !== mesh || before.exaggeration !== exaggeration) &&

@@ -8,15 +8,22 @@ const element = id => document.getElementById(id);
 const allTriangles = ({width, height}) => 2 * (width - 1) * (height - 1);
 
 function share(shown, all) {
+    if (!shown) return '';
     const percent = 100 * shown / all;
     return `${percent < 0.01 ? '< 0.01' : plain(percent)} % of the full mesh\u2019s ${count(all)}`;
 }
 
-/** What the service proves of an answer, as a sentence; and does it prove anything? */
-export function promiseOf({wish, told}) {
+/**
+ * What the service proves of an answer, as a sentence; and does it prove anything?
+ * @param rounding metres by which the terrain's heights were rounded at most: no eps below is kept
+ */
+export function promiseOf({wish, told, mesh}, rounding = 0) {
+    if (!mesh.triangleCount)
+        return {isProved: false, short: 'nothing to draw', text: 'There is nothing to draw: no three neighbours have heights.'};
     const isRange = wish.ask === 'range', unit = isRange ? metres : pixels;
-    const reached = isRange ? told.achievedEps : told.achievedTau, tolerance = Number.isFinite(reached) ? reached : wish.asked;
-    const coarser = tolerance > wish.asked * 1.001 ? ` ${unit(wish.asked)} would take too many triangles.` : '';
+    const reached = isRange ? told.achievedEps : told.achievedTau, answered = Number.isFinite(reached) ? reached : wish.asked;
+    const tolerance = isRange ? Math.max(answered, rounding) : answered;
+    const coarser = answered > wish.asked * 1.001 ? ` ${unit(wish.asked)} would take too many triangles.` : '';
     if (isRange) {
         const text = tolerance > 0 ? `nowhere more than ${unit(tolerance)} from any sample` : 'every sample is met exactly';
         return {isProved: true, short: unit(tolerance), text: `Proved: ${text}.${coarser}`};
@@ -44,14 +51,38 @@ export class Figures {
         if (value.textContent !== text) value.textContent = text;
     }
 
+    /** Of a terrain of which no mesh has come. */
+    showNothing() {
+        element('triangles').parentElement.hidden = true;
+        element('share').textContent = element('summary').textContent = 'Nothing is shown yet.';
+        element('promise').textContent = '';
+        for (const name of ['Vertices', 'Received', 'Answer', 'Decoding']) this.set(name, '\u2013');
+    }
+
+    /** What is in the picture was made for another view, and the one that is wanted does not come. */
+    showMissing() {
+        if (element('triangles').parentElement.hidden) return; // nothing is claimed
+        this.showPromise({isProved: false, short: 'not proved', text: 'Nothing is proved of this view: its mesh has not come.'});
+    }
+
+    /** Are they those of the view that is wanted now? Otherwise they are on their way. */
+    showWait(isWaiting) {
+        element('claim').setAttribute('aria-busy', isWaiting);
+    }
+
+    showPromise({isProved, short, text}, ...before) {
+        element('promise').textContent = text;
+        element('promise').classList.toggle('unproved', !isProved);
+        element('summary').textContent = [...before, short].join(', ');
+    }
+
     /** @param stage of stream.js @param terrain as service.js has it */
     showStage(stage, terrain) {
-        const {vertexCount, triangleCount} = stage.mesh, promise = promiseOf(stage);
+        const {vertexCount, triangleCount} = stage.mesh, promise = promiseOf(stage, terrain.terrain.quantum_error);
+        element('triangles').parentElement.hidden = false;
         element('triangles').textContent = count(triangleCount);
         element('share').textContent = share(triangleCount, allTriangles(terrain.terrain));
-        element('promise').textContent = promise.text;
-        element('promise').classList.toggle('unproved', !promise.isProved);
-        element('summary').textContent = `${count(triangleCount)} triangles, ${promise.short}`;
+        this.showPromise(promise, `${count(triangleCount)} triangles`);
         this.set('Vertices', count(vertexCount));
         this.set('Received', `${bytes(stage.bytes)}, ${(stage.bytes / Math.max(1, vertexCount)).toFixed(1)} B/vertex`);
         this.set('Answer', milliseconds(stage.milliseconds.answer));

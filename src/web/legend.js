@@ -24,9 +24,9 @@ function show(note, ramps, ticks) {
     }));
 }
 
-/** @param heights [lowest, highest] in metres @param errors the same of a mesh that has them */
+/** @param heights [lowest, highest] in metres, null where all is void @param errors the same of a mesh that has them */
 export function showLegend(colouring, heights, errors) {
-    legend.hidden = colouring === 'plain';
+    legend.hidden = colouring === 'plain' || colouring === 'relief' && heights[0] === null;
     if (legend.hidden) return;
     const [low, high] = colouring === 'relief' ? heights : errors;
     const ends = (first, middle, last) => [{at: 0, text: first}, {at: 0.5, text: middle}, {at: 1, text: last}];
@@ -36,8 +36,8 @@ export function showLegend(colouring, heights, errors) {
     } else if (low < 0 && high > 0) {
         const shore = clamp(-low / (high - low), 0.25, 0.75);
         show('Height', [{stops: SEA, share: shore}, {stops: LAND, share: 1 - shore}],
-            [{at: 0, text: plain(low)}, {at: shore, text: '0'}, {at: 1, text: metres(high)}]);
+            [{at: 0, text: plain(low)}, {at: shore, text: '0'}, {at: 1, text: `${plain(high)}\u00a0m`}]);
     } else {
-        show('Height', [{stops: low < 0 ? SEA : LAND, share: 1}], ends(plain(low), plain((low + high) / 2), metres(high)));
+        show('Height', [{stops: low < 0 ? SEA : LAND, share: 1}], ends(plain(low), plain((low + high) / 2), `${plain(high)}\u00a0m`));
     }
 }

@@ -1,12 +1,13 @@
 // marks.js - what is marked on the terrain: pins with their heights, and the line of a profile.
 
-import {Line2} from 'three/addons/lines/Line2.js';
-import {LineGeometry} from 'three/addons/lines/LineGeometry.js';
+import {LineSegments2} from 'three/addons/lines/LineSegments2.js';
+import {LineSegmentsGeometry} from 'three/addons/lines/LineSegmentsGeometry.js';
 import {LineMaterial} from 'three/addons/lines/LineMaterial.js';
 import {subtract} from './scene.js';
 
 const NAMESPACE = 'http://www.w3.org/2000/svg';
 const STEM = 22; // CSS pixels from the place to its label
+const FOOT = 4; // CSS pixels of a pin that the ground may hide
 
 function pinNode(label) {
     const node = document.createElementNS(NAMESPACE, 'g');
@@ -29,7 +30,7 @@ export class Marks {
         Object.assign(this, {overlay, pins: new Map(), lines: []});
         // Twice: where the mesh hides it, faintly.
         for (const [opacity, depthTest] of [[0.3, false], [1, true]]) {
-            const line = new Line2(new LineGeometry(), new LineMaterial({linewidth: 3, transparent: true, opacity, depthTest}));
+            const line = new LineSegments2(new LineSegmentsGeometry(), new LineMaterial({linewidth: 3, transparent: true, opacity, depthTest}));
             line.frustumCulled = false;
             line.visible = false;
             line.renderOrder = 2;
@@ -55,14 +56,15 @@ export class Marks {
         this.pins.set(name, {point, node});
     }
 
-    /** @param points of the scene, in runs: a void interrupts the line; none: no line */
-    line(points) {
-        const [origin] = points, positions = points.flatMap(point => subtract(point, origin));
+    /** @param runs of two or more points of the scene: a void interrupts the line; none: no line */
+    line(runs) {
+        const origin = runs[0]?.[0], place = point => subtract(point, origin);
+        const positions = runs.flatMap(run => run.slice(1).flatMap((point, i) => [...place(run[i]), ...place(point)]));
         for (const line of this.lines) {
-            line.visible = points.length > 1;
+            line.visible = runs.length > 0;
             if (!line.visible) continue;
             line.geometry.dispose();
-            line.geometry = new LineGeometry();
+            line.geometry = new LineSegmentsGeometry();
             line.geometry.setPositions(positions);
             line.position.set(...origin);
         }
@@ -73,12 +75,18 @@ export class Marks {
         this.line([]);
     }
 
-    /** Puts everything where the camera sees it. */
-    place(camera, width, height) {
+    /**
+     * Puts everything where the camera sees it.
+     * @param hides(x, y, depth) is something in front of that depth, at a place of the picture?
+     */
+    place(camera, width, height, hides) {
         for (const {point, node} of this.pins.values()) {
             const at = camera.project(point);
             node.style.display = at ? '' : 'none';
-            if (at) node.setAttribute('transform', `translate(${(at.x + 1) / 2 * width} ${(1 - at.y) / 2 * height})`);
+            if (!at) continue;
+            node.setAttribute('transform', `translate(${(at.x + 1) / 2 * width} ${(1 - at.y) / 2 * height})`);
+            // Looked for a little above its foot: the mesh there may be as much higher than the terrain.
+            node.classList.toggle('behind', hides(at.x, at.y + 2 * FOOT / height, at.depth));
         }
     }
 }

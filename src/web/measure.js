@@ -2,6 +2,7 @@
 // full-resolution samples, whatever mesh is in the picture.
 
 import {height as exactly, metres, place as placeText} from './format.js';
+import {runsOf} from './profile.js';
 import {askHeight, askProfile} from './service.js';
 
 const reading = document.getElementById('reading');
@@ -39,8 +40,7 @@ export class Measure {
     }
 
     drawLine() {
-        const rows = (this.rows || []).filter(row => row[3] !== null);
-        this.marks.line(rows.map(([, x, y, z]) => this.pointOf([x, y, z])));
+        this.marks.line(runsOf(this.rows || []).map(run => run.map(([, x, y, z]) => this.pointOf([x, y, z]))));
     }
 
     /** @param place [x, y, metres] on the mesh that was clicked @param tool height or profile */

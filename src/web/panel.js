@@ -18,6 +18,10 @@ export class Panel {
             element(id).addEventListener('change', event => changed({[id]: event.target.value}));
         for (const id of ['wires', 'morph'])
             element(id).addEventListener('change', event => changed({[id]: event.target.checked}));
+        // Who presses them with a pointer wants to move by keys next; who has come by Tab stays.
+        element('panel').addEventListener('click', ({detail, target}) => {
+            if (detail > 0 && target.matches('[type=radio], [type=checkbox]')) target.blur();
+        });
         element('terrain').addEventListener('change', event => changed({terrain: event.target.value}));
         element('tau').max = TAUS.length - 1;
         element('eps').max = EPSES.length - 1;
@@ -49,7 +53,8 @@ export class Panel {
         this.slide('eps', nearest(EPSES, settings.eps), metres(settings.eps));
         this.slide('exaggeration', settings.exaggeration, `${plain(settings.exaggeration)}\u00a0\u00d7`);
         const {width, height, min_z: lowest, max_z: highest} = terrain.terrain;
-        element('facts').textContent = `${count(width)} \u00d7 ${count(height)} samples, ${plain(lowest)} to ${metres(highest)}`;
+        const heights = lowest === null ? 'all void' : `${plain(lowest)} to ${plain(highest)}\u00a0m`;
+        element('facts').textContent = `${count(width)} \u00d7 ${count(height)} samples, ${heights}`;
     }
 
     slide(id, value, text) {

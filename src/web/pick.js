@@ -61,6 +61,6 @@ export function pickPoint(geometry, eye, ray) {
 /** The point of the mesh under a point of the scene, or over it where it is below; null where there is none. */
 export function groundBelow(geometry, scene, point) {
     const {up} = scene.axes(scene.place(point));
-    const above = 1e5; // no ground is higher above any eye that has got below it
+    const above = 1e7; // metres: no ground is higher above any eye that has got below it, ten- or a hundredfold
     return pickPoint(geometry, add(point, up, above), up.map(component => -component));
 }

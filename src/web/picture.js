@@ -23,9 +23,22 @@ export class Picture {
         this.eye.matrixAutoUpdate = false;
         canvas.addEventListener('webglcontextlost', event => {
             event.preventDefault();
+            this.forget();
             lost(true);
         });
         canvas.addEventListener('webglcontextrestored', () => lost(false));
+    }
+
+    /**
+     * Gives back what of the scene is on the graphics card; the next frame puts it there again. While the context is lost,
+     * this does nothing but make three.js forget; once it is back, what was of the old one could not be deleted any more.
+     */
+    forget() {
+        this.scene.traverse(({geometry, material}) => {
+            geometry?.dispose();
+            material?.dispose();
+            for (const {value} of Object.values(material?.uniforms || {})) value?.dispose?.();
+        });
     }
 
     /** Takes the size of the canvas on the page; is it another one? Width and height are those of the drawing buffer. */

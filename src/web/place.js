@@ -3,16 +3,14 @@
  *
  * The scene is that of views (ext/scene.c): metres. Of a projected terrain x*m, y*m, z*e, where m is metres in a unit
  * of its coordinates and e the exaggeration of heights. Of one in longitude and latitude it is geocentric (ECEF) on
- * WGS 84, heights times e above the ellipsoid.
+ * the ellipsoid of its CRS, heights times e above that.
  *
  * What is drawn is in float32, which is good for seven digits: so a scene has an origin near what is looked at, places
  * are computed in double, and only their differences from it are rounded.
  */
 import {factorOf, metresOf} from './header.js';
 
-/** WGS 84: semi-major axis in metres, flattening. */
-const A = 6378137, F = 1 / 298.257223563;
-const E2 = F * (2 - F), RADIAN = Math.PI / 180;
+const RADIAN = Math.PI / 180;
 
 /** @typedef {[number, number, number]} Point */
 
@@ -23,11 +21,14 @@ export class Place {
      * @param {boolean} how.lonlat         longitude and latitude in degrees, not projected
      * @param {number} [how.metre]         metres in a unit of projected coordinates; 1
      * @param {number} [how.exaggeration]  of heights; 1
+     * @param {number} [how.semiMajor]          of the ellipsoid, metres; that of WGS 84
+     * @param {number} [how.inverseFlattening]  0: a sphere; that of WGS 84
      */
-    constructor({lonlat, metre = 1, exaggeration = 1}) {
+    constructor({lonlat, metre = 1, exaggeration = 1, semiMajor = 6378137, inverseFlattening = 298.257223563}) {
         this.lonlat = lonlat;
         this.metre = metre;
         this.exaggeration = exaggeration;
+        this.ellipsoid = ellipsoidOf(semiMajor, inverseFlattening ? 1 / inverseFlattening : 0);
     }
 
     /**
@@ -36,7 +37,7 @@ export class Place {
      */
     pointOf(x, y, z) {
         const h = z * this.exaggeration;
-        return this.lonlat ? geocentric(x, y, h) : [x * this.metre, y * this.metre, h];
+        return this.lonlat ? geocentric(this.ellipsoid, x, y, h) : [x * this.metre, y * this.metre, h];
     }
 
     /**
@@ -44,7 +45,7 @@ export class Place {
      * @returns {Point} x, y (degrees where the terrain is in them) and metres
      */
     crsOf(x, y, z) {
-        const [cx, cy, h] = this.lonlat ? geodetic(x, y, z) : [x / this.metre, y / this.metre, z];
+        const [cx, cy, h] = this.lonlat ? geodetic(this.ellipsoid, x, y, z) : [x / this.metre, y / this.metre, z];
         return [cx, cy, this.exaggeration === 0 ? 0 : h / this.exaggeration];
     }
 
@@ -77,14 +78,15 @@ export class Place {
             }
             return out;
         }
+        const {a, e2} = this.ellipsoid;
         // Sines and cosines of each column and row once: terrain has many vertices in each.
         const lon = circle((c) => x0 + c * dx), lat = circle((r) => y0 + r * dy);
         for (let i = 0; i < vertexCount; i++) {
             const {sine: sl, cosine: cl} = lon(col[i]), {sine: sp, cosine: cp} = lat(row[i]);
-            const n = A / Math.sqrt(1 - E2 * sp * sp), h = metresOf(mesh, heights[i]) * this.exaggeration;
+            const n = a / Math.sqrt(1 - e2 * sp * sp), h = metresOf(mesh, heights[i]) * this.exaggeration;
             out[3 * i] = (n + h) * cp * cl - ox;
             out[3 * i + 1] = (n + h) * cp * sl - oy;
-            out[3 * i + 2] = (n * (1 - E2) + h) * sp - oz;
+            out[3 * i + 2] = (n * (1 - e2) + h) * sp - oz;
         }
         return out;
     }
@@ -95,10 +97,13 @@ function circle(degreesOf) {
     return (i) => known[i] ??= {sine: Math.sin(degreesOf(i) * RADIAN), cosine: Math.cos(degreesOf(i) * RADIAN)};
 }
 
-/** On WGS 84; degrees and metres. @returns {Point} */
-function geocentric(lon, lat, h) {
-    const sp = Math.sin(lat * RADIAN), cp = Math.cos(lat * RADIAN), n = A / Math.sqrt(1 - E2 * sp * sp);
-    return [(n + h) * cp * Math.cos(lon * RADIAN), (n + h) * cp * Math.sin(lon * RADIAN), (n * (1 - E2) + h) * sp];
+/** What formulas need: semi-major axis, flattening, the square of the eccentricity. */
+const ellipsoidOf = (a, f) => ({a, f, e2: f * (2 - f)});
+
+/** Degrees and metres. @returns {Point} */
+function geocentric({a, e2}, lon, lat, h) {
+    const sp = Math.sin(lat * RADIAN), cp = Math.cos(lat * RADIAN), n = a / Math.sqrt(1 - e2 * sp * sp);
+    return [(n + h) * cp * Math.cos(lon * RADIAN), (n + h) * cp * Math.sin(lon * RADIAN), (n * (1 - e2) + h) * sp];
 }
 
 /**
@@ -106,16 +111,16 @@ function geocentric(lon, lat, h) {
  * what doubles can tell apart. At the Earth's centre the latitude is 90.
  * @returns {Point}
  */
-function geodetic(x, y, z) {
-    const p = Math.hypot(x, y), b = A * (1 - F), lon = Math.atan2(y, x) / RADIAN;
-    let u = Math.atan2(z * A, p * b); // reduced latitude
+function geodetic({a, f, e2}, x, y, z) {
+    const p = Math.hypot(x, y), b = a * (1 - f), lon = Math.atan2(y, x) / RADIAN;
+    let u = Math.atan2(z * a, p * b); // reduced latitude
     let lat = 0;
     for (let i = 0; i < 4; i++) {
         const s = Math.sin(u), c = Math.cos(u);
-        lat = Math.atan2(z + E2 / (1 - E2) * b * s ** 3, p - E2 * A * c ** 3);
-        u = Math.atan2((1 - F) * Math.sin(lat), Math.cos(lat));
+        lat = Math.atan2(z + e2 / (1 - e2) * b * s ** 3, p - e2 * a * c ** 3);
+        u = Math.atan2((1 - f) * Math.sin(lat), Math.cos(lat));
     }
     const sp = Math.sin(lat), cp = Math.cos(lat);
     // Along the normal, wherever it points.
-    return [lon, lat / RADIAN, p * cp + z * sp - A * Math.sqrt(1 - E2 * sp * sp)];
+    return [lon, lat / RADIAN, p * cp + z * sp - a * Math.sqrt(1 - e2 * sp * sp)];
 }

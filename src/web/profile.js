@@ -21,7 +21,7 @@ export function ticksOf(low, high, many) {
 }
 
 /** The runs of rows that have a height. */
-function runsOf(rows) {
+export function runsOf(rows) {
     const runs = [[]];
     for (const row of rows)
         if (row[3] === null) runs.push([]);
@@ -130,7 +130,7 @@ export class Profile {
             const sum = sign => climbs.reduce((total, climb) => total + Math.max(0, sign * climb), 0);
             this.hair.replaceChildren();
             this.reading.textContent = `${metres(this.length)} long, ${plain(Math.min(...heights))} to ` +
-                `${metres(Math.max(...heights))}, ${metres(sum(1))} up, ${metres(sum(-1))} down`;
+                `${plain(Math.max(...heights))}\u00a0m, ${metres(sum(1))} up, ${metres(sum(-1))} down`;
             return;
         }
         const at = this.x(distance);

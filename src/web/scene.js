@@ -23,29 +23,20 @@ export function rotate(p, axis, angle) {
     return add(add(scaled(p, c), cross(axis, p), s), axis, dot(axis, p) * (1 - c));
 }
 
-/** Is the CRS of this WKT in degrees? */
-function isGeographic(wkt) {
-    return /^\s*(COMPD_CS|COMPOUNDCRS)?[^A-Z]*("[^"]*"\s*,\s*)?(GEOGCS|GEOGCRS|GEODCRS)\[/i.test(wkt);
-}
-
-/** Metres in a unit of x and y of a projected CRS: its last UNIT, for what is before belongs to its base. */
-function metreOf(wkt) {
-    const projected = wkt.replace(/VERT_?C(S|RS)\[.*$/i, '');
-    const units = [...projected.matchAll(/(?:UNIT|LENGTHUNIT)\["[^"]*",\s*([0-9.eE+-]+)/gi)];
-    const metre = units.length ? Number(units[units.length - 1][1]) : 1;
-    return metre > 0 ? metre : 1;
-}
-
 /**
- * @param {string} wkt the CRS; '' where there is none.
- * @return the scene: `isSpace`: is it geocentric? `metre`: of a planar one, metres in a unit of x and y. Its points are at
+ * @param terrain what the service tells of it: `lonlat` 1 where x and y are longitude and latitude, with `semi_major` and
+ *     `inverse_flattening` of the ellipsoid; else `metre`, metres in a unit of x and y.
+ * @return the scene: `isSpace`: is it geocentric? `how`: the places of its CRS, as place.js takes them. Its points are at
  *     heights as they are given; whoever draws the ground has exaggerated them.
  */
-export function createScene(wkt) {
-    const isSpace = isGeographic(wkt), metre = isSpace || !wkt ? 1 : metreOf(wkt), place = new Place({lonlat: isSpace, metre});
+export function createScene(terrain) {
+    const isSpace = Boolean(terrain.lonlat);
+    const how = isSpace ? {lonlat: true, semiMajor: terrain.semi_major, inverseFlattening: terrain.inverse_flattening} :
+        {lonlat: false, metre: terrain.metre};
+    const place = new Place(how);
     return {
         isSpace,
-        metre,
+        how,
         /** @return {Vector} the point of a place */
         point: ([x, y, height]) => place.pointOf(x, y, height),
         /** @return {Vector} the place of a point */

@@ -46,7 +46,9 @@ const of = (terrain, endpoint, parameters) => {
 export async function askTerrains() {
     const {collections, problems} = await askJson('collections');
     if (!collections.length && problems?.length) throw new Problem(problems[0].detail || 'No database can be read.', false);
-    return collections.map(({id, extent, terrain}) => ({id, bbox: extent.spatial.bbox[0], terrain}));
+    // Heights that a terrain does not have, for all of it is void, are null.
+    return collections.map(({id, extent, terrain}) =>
+        ({id, bbox: extent.spatial.bbox[0], terrain: {min_z: null, max_z: null, ...terrain}}));
 }
 
 /**

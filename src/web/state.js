@@ -16,7 +16,7 @@ const among = (text, names) => names.includes(text) ? text : undefined;
 /** What the fragment says; undefined where it says nothing of use. */
 export function readFragment(fragment) {
     const given = new URLSearchParams(fragment.replace(/^#/, ''));
-    const eye = (given.get('eye') || '').split(',').map(Number);
+    const eye = (given.get('eye') || '').split(',').map(text => number(text, -1e15, 1e15));
     return {
         terrain: given.get('terrain') || undefined,
         camera: eye.length === 3 && eye.every(Number.isFinite) ? {

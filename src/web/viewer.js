@@ -19,7 +19,7 @@ import {Panel} from './panel.js';
 import {groundBelow, pickPoint} from './pick.js';
 import {Picture} from './picture.js';
 import {Profile} from './profile.js';
-import {add, createScene, dot, length, subtract} from './scene.js';
+import {add, clamp, createScene, dot, length, subtract} from './scene.js';
 import {rangePath, viewPath} from './service.js';
 import {readFragment, writeFragment} from './state.js';
 import {Stream} from './stream.js';
@@ -92,9 +92,11 @@ export class Viewer {
         const chosen = this.terrains.find(({id}) => id === terrain) || this.terrain || this.terrains[0];
         if (terrain && chosen.id !== terrain) this.fail(`There is no terrain ${terrain}.`);
         this.open(chosen);
+        this.camera.exaggeration = this.settings.exaggeration;
         if (camera) {
-            this.camera.read({...camera, exaggeration: this.settings.exaggeration});
+            this.camera.read(camera);
             this.glide.stop();
+            this.isStandTaken = true;
         }
         this.changed();
     }
@@ -105,10 +107,12 @@ export class Viewer {
         this.terrain = terrain;
         this.measure.clear();
         this.layer.clear();
+        this.figures.showNothing();
+        this.isMeshMissing = false;
         this.stage = null;
-        this.scene = createScene(terrain.terrain.crs);
+        this.scene = createScene(terrain.terrain);
         // The same object for the same terrain: by this the worker knows it.
-        terrain.forWorker ||= {isSpace: this.scene.isSpace, metre: this.scene.metre};
+        terrain.forWorker ||= this.scene.how;
         this.camera = new Camera(this.scene);
         this.extent = extentOf(this.scene, terrain);
         this.orbit = new Orbit(this.camera, at => this.pointAt(at), 4 * this.extent.radius);
@@ -117,10 +121,11 @@ export class Viewer {
         this.camera.exaggeration = this.settings.exaggeration;
         this.picture.fit(this.camera);
         this.stand();
+        this.isStandTaken = false;
         document.title = `${terrain.id} \u2013 rqt`;
     }
 
-    /** The heights of the ground as they are drawn. */
+    /** The heights of the ground as they are drawn; 0 where all is void. */
     heights() {
         const {min_z: lowest, max_z: highest} = this.terrain.terrain;
         return [lowest * this.settings.exaggeration, highest * this.settings.exaggeration];
@@ -128,10 +133,17 @@ export class Viewer {
 
     stand() {
         this.camera.fovy = Camera.usualAngle(this.camera.width, this.camera.height);
-        lookAtAll(this.camera, this.terrain.bbox, this.heights());
+        lookAtAll(this.camera, this.terrain.bbox, this.heights(), this.stage?.geometry, this.openShare());
+    }
+
+    /** How much of the picture's height a phone's sheet leaves: its middle is that of what is left (viewer.css). */
+    openShare() {
+        const canvas = element('picture').getBoundingClientRect();
+        return clamp(1 + 2 * canvas.top / canvas.height, 0.2, 1);
     }
 
     lookAtAll() {
+        this.isStandTaken = true;
         this.glide.to(() => this.stand(), performance.now(), isStill.matches);
         this.redraw();
     }
@@ -202,6 +214,7 @@ export class Viewer {
     /** The camera has moved by hand. */
     moved() {
         this.glide.stop();
+        this.isStandTaken = true;
         element('hint').classList.add('gone');
         this.redraw();
     }
@@ -215,6 +228,12 @@ export class Viewer {
     /** The point of the mesh at a place of the picture, or null. */
     pointAt(at) {
         return this.stage && pickPoint(this.stage.geometry, this.camera.eye, this.camera.direction(...at));
+    }
+
+    /** Is the mesh at a place of the picture well in front of a depth? */
+    hides(x, y, depth) {
+        const point = this.pointAt([x, y]);
+        return Boolean(point) && this.camera.project(point).depth < 0.98 * depth;
     }
 
     ground() {
@@ -279,18 +298,25 @@ export class Viewer {
     async show(stage) {
         if (stage.wish.terrain !== this.terrain.forWorker) return;
         this.stage = {...stage, errorRange: rangeOf(stage.geometry.errors)};
+        // How high the terrain is where is known by its first mesh: nobody has seen it from anywhere else yet.
+        if (!this.isStandTaken) this.stand();
+        this.isStandTaken = true;
         this.layer.show(stage, performance.now());
         this.figures.showStage(stage, this.terrain);
         element('bare').href = stage.wish.path;
         this.paint();
         if (this.isMeshMissing) this.fail('');
+        this.isMeshMissing = false;
         this.redraw();
         while (this.layer.isMoving) await new Promise(resolve => requestAnimationFrame(resolve));
     }
 
-    /** Says what is wrong; '': nothing is. What is said of a mesh that does not come goes when one does. */
+    /** Says what is wrong; '': nothing is. What is said while a mesh does not come goes when one does. */
     fail(sentence, isMeshMissing = false) {
-        this.isMeshMissing = isMeshMissing;
+        if (isMeshMissing) {
+            this.isMeshMissing = true;
+            this.figures.showMissing();
+        }
         element('problem').hidden = !sentence;
         element('problem').querySelector('p').textContent = sentence;
     }
@@ -329,9 +355,11 @@ export class Viewer {
         this.layer.uniforms.hazeDistance.value = extent.radius * 3;
         if (!this.isLost) this.picture.draw(camera, Number.isNaN(clearance) ? extent.radius : clearance, extent);
         frames.cost = performance.now() - started;
-        this.stream.want(this.wish());
+        const wish = this.wish();
+        this.stream.want(wish);
+        this.figures.showWait(this.stage?.wish.path !== wish.path && !this.isMeshMissing);
         const {clientWidth, clientHeight} = element('picture');
-        this.marks.place(camera, clientWidth, clientHeight);
+        this.marks.place(camera, clientWidth, clientHeight, (x, y, depth) => this.hides(x, y, depth));
         element('needle').setAttribute('transform', `rotate(${-camera.yaw})`);
         const [x, y] = camera.place;
         this.figures.showEye(clearance, placeText(x, y, this.scene.isSpace, 4));
@@ -381,6 +409,7 @@ export class Viewer {
 
     setCamera(json) {
         this.glide.stop();
+        this.isStandTaken = true;
         this.camera.read(json);
         if (json.tau > 0) this.settings.tau = json.tau;
         this.settings.exaggeration = this.camera.exaggeration;

@@ -26,5 +26,5 @@ MUTANTS = [
     ("morph: the set is not closed", "src/web/morph.js", "if (!isWhole || this.isClamped) this.closeSet", "if (0) this.closeSet", MORPH, "at every sample"),
     ("morph: all leaves are kept", "src/web/morph.js", "if (!isWhole) this.kept[m] = leavesByApex(mesh);", "", MORPH, "at every sample"),
     ("places: the exaggeration comes too late", "src/web/place.js", "h = metresOf(mesh, heights[i]) * this.exaggeration;", "h = metresOf(mesh, heights[i]);", PLACE, "exaggerated"),
-    ("places: a sphere", "src/web/place.js", "(n * (1 - E2) + h) * sp];", "(n + h) * sp];", PLACE, "where SQL puts them"),
+    ("places: a sphere", "src/web/place.js", "(n * (1 - e2) + h) * sp];", "(n + h) * sp];", PLACE, "where SQL puts them"),
 ]

@@ -2,19 +2,19 @@
 import assert from 'node:assert/strict';
 import {test} from 'node:test';
 import {Camera, lookAtAll} from '../../src/web/camera.js';
+import {promiseOf} from '../../src/web/figures.js';
 import {Fly} from '../../src/web/fly.js';
 import {CHUNK, buildGeometry, edgesOf} from '../../src/web/geometry.js';
 import {Orbit} from '../../src/web/orbit.js';
 import {groundBelow, pickPoint} from '../../src/web/pick.js';
 import {Place} from '../../src/web/place.js';
-import {ticksOf} from '../../src/web/profile.js';
+import {runsOf, ticksOf} from '../../src/web/profile.js';
 import {add, createScene, dot, length, subtract, unit} from '../../src/web/scene.js';
 import {readFragment, writeFragment} from '../../src/web/state.js';
 import {Dice} from './oracle.mjs';
 
-const DEGREES = 'GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],UNIT["degree",0.0174532925199433]]';
-const FEET = 'PROJCS["feet",GEOGCS["NAD83",UNIT["degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],UNIT["US survey foot",0.3048006096012192]]';
-const SCENES = {degrees: createScene(DEGREES), feet: createScene(FEET), bare: createScene('')};
+const DEGREES = {lonlat: 1, semi_major: 6378137, inverse_flattening: 298.257223563}, FEET = {lonlat: 0, metre: 0.3048006096012192};
+const SCENES = {degrees: createScene(DEGREES), feet: createScene(FEET), bare: createScene({})};
 const near = (a, b, most, why) => assert.ok(a.every((v, i) => Math.abs(v - b[i]) <= most), `${why}: ${a} and ${b}`);
 
 const dice = new Dice(20260);
@@ -43,12 +43,16 @@ function ridges(n, place) {
     return mesh;
 }
 
-test('a CRS in feet is metres in the scene, one in degrees is geocentric', () => {
+test('a CRS in feet is metres in the scene, one in degrees is geocentric on its own ellipsoid', () => {
     near(SCENES.feet.point([1000, 2000, 30]), [304.8006096012192, 609.6012192024384, 30], 1e-9, 'feet');
-    assert.equal(SCENES.degrees.isSpace, true);
-    assert.equal(SCENES.bare.metre, 1);
-    assert.equal(createScene(`COMPD_CS["x",${DEGREES},VERT_CS["h",UNIT["metre",1]]]`).isSpace, true);
-    assert.equal(createScene(`COMPD_CS["x",${FEET},VERT_CS["h",UNIT["metre",1]]]`).metre, 0.3048006096012192);
+    near(SCENES.bare.point([1000, 2000, 30]), [1000, 2000, 30], 0, 'no CRS');
+    near(SCENES.degrees.point([90, 0, 30]), [0, 6378167, 0], 1e-8, 'equator');
+    const clarke = createScene({lonlat: 1, semi_major: 6378206.4, inverse_flattening: 294.9786982139006}), sphere = createScene({lonlat: 1, semi_major: 6371000, inverse_flattening: 0});
+    near(clarke.point([-100, 90, 30]), [0, 0, 6356583.8 + 30], 1e-6, 'Clarke 1866, pole');
+    near(clarke.place(clarke.point([-100, 40, 30])), [-100, 40, 30], 1e-8, 'Clarke 1866, back');
+    near(sphere.point([0, 90, 30]), [0, 0, 6371030], 1e-8, 'sphere, pole');
+    near(new Place(clarke.how).positionsOf({x0: 0, y0: 90, dx: 1, dy: -1, z0: 0, d: 1, numerator: 1, denominator: 1, scale: 1, offset: 0, vertexCount: 1,
+        col: [0], row: [0], q: [7]}, [0, 0, 6356583.8]), [0, 0, 7], 1e-5, 'Clarke 1866, a mesh');
 });
 
 test('a camera is what its JSON says: read again it asks the same', () => {
@@ -81,22 +85,38 @@ test('a camera looks to the north and up where its angles say so', () => {
     near([camera.yaw, camera.pitch], [0, -45], 1e-9, 'at');
 });
 
+/** What of the picture points take: {x, y, width, height}, x and y of the middle. */
+function frameOf(camera, points) {
+    const seen = points.map(point => camera.project(point));
+    assert.ok(seen.every(one => one && Math.abs(one.x) < 1 && Math.abs(one.y) < 1), 'every point is in the picture');
+    const [xs, ys] = ['x', 'y'].map(axis => seen.map(one => one[axis]));
+    const [left, right, low, high] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
+    return {x: (left + right) / 2, y: (low + high) / 2, width: right - left, height: high - low};
+}
+
 test('the whole terrain is in the picture, in any shape of window', () => {
-    for (const [scene, box] of [[SCENES.degrees, [-72, 44, -71, 45]], [SCENES.degrees, [1, 41, 2, 43]], [SCENES.bare, [0, 0, 4000, 4000]], [SCENES.feet, [5e5, 4e6, 9e5, 4.1e6]]])
-        for (const [width, height] of [[1280, 800], [360, 600], [600, 360]]) {
-            const camera = new Camera(scene);
-            Object.assign(camera, {width, height, fovy: Camera.usualAngle(width, height)});
-            lookAtAll(camera, box, [100, 2000]);
-            let most = 0;
-            for (const x of [box[0], box[2]])
-                for (const y of [box[1], box[3]])
-                    for (const z of [100, 2000]) {
-                        const seen = camera.project(scene.point([x, y, z]));
-                        assert.ok(Math.abs(seen.x) < 1 && Math.abs(seen.y) < 1, JSON.stringify(seen));
-                        most = Math.max(most, Math.abs(seen.x) / 0.93, Math.abs(seen.y) / 0.9);
-                    }
-            assert.ok(most > 0.97, `it fills the picture: ${most}`);
-        }
+    const globe = [-180, -90, 180, 90], places = [[SCENES.degrees, [-72, 44, -71, 45]], [SCENES.degrees, [1, 41, 2, 43]],
+        [SCENES.degrees, [-20, -35, 50, 37]], [SCENES.degrees, globe], [SCENES.bare, [0, 0, 4000, 4000]], [SCENES.feet, [5e5, 4e6, 9e5, 4.1e6]]];
+    for (const [scene, box] of places)
+        for (const [width, height, share] of [[1280, 800, 1], [360, 600, 1], [600, 360, 1], [360, 600, 0.58]])
+            for (const highest of [2000, 300]) {
+                const camera = new Camera(scene), points = [];
+                Object.assign(camera, {width, height, fovy: Camera.usualAngle(width, height)});
+                for (let i = 0; i <= 8; i++)
+                    for (let j = 0; j <= 8; j++)
+                        for (const z of [100, 100 + (highest - 100) * j / 8])
+                            points.push(scene.point([box[0] + (box[2] - box[0]) * i / 8, box[1] + (box[3] - box[1]) * j / 8, z]));
+                // A mesh may be anywhere between its lowest and highest height: it is its own picture that is in the middle.
+                const origin = points[0], mesh = {origin, positions: points.flatMap(point => subtract(point, origin))};
+                lookAtAll(camera, box, [100, 2000], mesh, share);
+                const found = frameOf(camera, points), why = JSON.stringify({box, width, height, share, highest, ...found});
+                near([found.x, found.y], [0, 0], 0.001, why);
+                assert.ok(Math.max(found.width / 1.86, found.height / 1.8 / share) > 0.999, `it fills the picture: ${why}`);
+                assert.ok(found.height < 1.8 * share + 1e-6, why);
+                assert.equal(camera.yaw, 0);
+                lookAtAll(camera, box, [100, 2000]);
+                frameOf(camera, points);
+            }
 });
 
 test('orbit: the ground that is held stays where it is in the picture, or under the pointer', () => {
@@ -203,6 +223,23 @@ test('ticks are round numbers within the axis', () => {
     }
 });
 
+test('a void ends a run of a profile, and a single height is none', () => {
+    const rows = [5, 6, null, 7, null, null, 8, 9, 10].map((z, i) => [i, i, 0, z]);
+    assert.deepEqual(runsOf(rows).map(run => run.map(([, , , z]) => z)), [[5, 6], [8, 9, 10]]);
+});
+
+test('what is proved is never less than what was rounded, and nothing of no triangle', () => {
+    const answer = (ask, asked, achieved) => ({wish: {ask, asked}, told: {achievedEps: achieved, achievedTau: achieved, guaranteed: 1}, mesh: {triangleCount: 9}});
+    const text = (...all) => promiseOf(...all).text.replaceAll('\u00a0', ' ');
+    assert.match(text(answer('range', 0, 0), 0), /^Proved: every sample is met exactly\.$/);
+    assert.match(text(answer('range', 0, 0), 0.00048828125), /^Proved: nowhere more than 0\.00049 m from any sample\.$/);
+    assert.match(text(answer('range', 5, 5), 0.00048828125), /^Proved: nowhere more than 5 m from any sample\.$/);
+    assert.match(text(answer('range', 5, 10.5), 0), /10\.5 m from any sample\. 5 m would take too many triangles\.$/);
+    assert.match(text(answer('view', 1, 1), 0), /off by more than 1 px\.$/);
+    assert.ok(promiseOf(answer('view', 1, 1)).isProved);
+    for (const ask of ['view', 'range']) assert.equal(promiseOf({...answer(ask, 1, 1), mesh: {triangleCount: 0}}).isProved, false);
+});
+
 test('the address says what is shown, and nonsense in it nothing', () => {
     const state = {terrain: 'a b/&=c', eye: [-71.25, 44.5, 1234.567], yaw: 12.3456, pitch: -8, fovy: 40, exaggeration: 2.5, ask: 'view', tau: 1.5, colour: 'error', wires: true, mode: 'fly'};
     const {camera, ...read} = readFragment(writeFragment(state));
@@ -211,4 +248,5 @@ test('the address says what is shown, and nonsense in it nothing', () => {
     assert.equal(read.capture, false);
     const nonsense = readFragment('#eye=1,2&tau=-3&eps=many&ask=all&colour=__proto__&mode=&exaggeration=NaN');
     for (const [key, value] of Object.entries(nonsense)) assert.ok(value === undefined || value === false, `${key}: ${value}`);
+    for (const eye of [',,', '1,,2', '1e300,0,0', '1,2,NaN']) assert.equal(readFragment(`#eye=${eye}`).camera, undefined, eye);
 });

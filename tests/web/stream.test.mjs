@@ -24,7 +24,7 @@ globalThis.Worker = class {
 };
 const {Stream} = await import('../../src/web/stream.js');
 
-const TERRAIN = {isSpace: false, metre: 1};
+const TERRAIN = {lonlat: false, metre: 1};
 const wish = (path, more = {}) => ({path, terrain: TERRAIN, exaggeration: 1, withEdges: false, withMorph: true, origin: [0, 0, 0], ...more});
 /** Until nothing is left to do but to wait for the service. */
 const turn = async () => { for (let i = 0; i < 50; i++) await new Promise(resolve => setTimeout(resolve)); };

@@ -109,6 +109,41 @@ test('keys fly, colour, draw edges and help', keepingShots('keys', () => views, 
     await view.close();
 }));
 
+test('keys move the camera after a pointer has pressed a control, and not behind the help', keepingShots('keys after pointer', () => views, async () => {
+    const view = await open(), {page} = view, {keyboard} = page;
+    const moved = async key => {
+        const {camera: from} = await view.state();
+        await keyboard.down(key);
+        await view.until(from => JSON.stringify(window.rqtViewer.state().camera.eye) !== JSON.stringify(from), Boolean, from.eye);
+        await keyboard.up(key);
+    };
+    for (const control of ['#tau', '#wires', '#colour [value=plain]', '#mode [value=fly]']) {
+        await page.locator(control).click();
+        await moved('w');
+    }
+    await moved('ArrowUp');
+    assert.equal((await view.state()).mode, 'fly');
+    await view.settled();
+    const {camera} = await view.state();
+    await keyboard.press('?');
+    await page.waitForSelector('#help[open]');
+    await keyboard.down('w');
+    await page.evaluate(() => new Promise(resolve => requestAnimationFrame(() => requestAnimationFrame(resolve))));
+    await keyboard.up('w');
+    assert.deepEqual((await view.state()).camera, camera);
+    assert.deepEqual(view.problems, []);
+    await view.close();
+}));
+
+test('an address that names an exaggeration alone is asked with it', keepingShots('address exaggeration', () => views, async () => {
+    const view = await open();
+    await view.page.evaluate(() => { location.hash = '#terrain=metres&exaggeration=5'; });
+    await until(view, s => s.exaggeration === 5);
+    assert.equal(JSON.parse(view.lastAsked('/view').parameters.camera).exaggeration, 5);
+    assert.deepEqual(view.problems, []);
+    await view.close();
+}));
+
 test('an address keeps a view: loaded again it is the same picture', keepingShots('address', () => views, async () => {
     const view = await open('degrees');
     await view.see({eye: [-71.42, 44.12, 2600], yaw: 31, pitch: -14, fovy: 50, position: 'crs'});
@@ -135,6 +170,30 @@ test('names: every control says what it is', keepingShots('names', () => views, 
     assert.ok(controls.length >= 15, `${controls.length} controls`);
     assert.deepEqual(controls.filter(n => !n.name?.value?.trim()).map(n => `${n.role.value} ${JSON.stringify(n.properties)}`), []);
     assert.equal(await view.page.evaluate(() => document.documentElement.lang), 'en');
+    await view.close();
+}));
+
+test('on a phone the open sheet leaves the terrain to be seen, and what its sliders do', keepingShots('sheet', () => views, async () => {
+    const view = await open('metres', PHONE);
+    await view.page.click('#sheet');
+    await view.settled();
+    const top = await view.page.evaluate(() => document.querySelector('#panel').getBoundingClientRect().top);
+    assert.ok(top > 0.5 * PHONE.height, `the sheet begins at ${top}`);
+    const before = await view.picture(), pixels = new Uint32Array(before.rgba.buffer), ground = pixels[0];
+    const rows = Array.from({length: before.height}, (none, y) => pixels.subarray(y * before.width, (y + 1) * before.width));
+    const shown = rows.map((row, y) => row.some(pixel => pixel !== ground) ? y : -1).filter(y => y >= 0);
+    const middle = (shown[0] + shown.at(-1)) / 2;
+    assert.ok(middle > top / 4 && middle < 3 * top / 4, `the terrain is from ${shown[0]} to ${shown.at(-1)}, the sheet begins at ${top}`);
+    const {triangles} = await view.state();
+    await view.page.focus('#tau');
+    await view.page.keyboard.press('End');
+    await until(view, s => s.camera.tau === 64);
+    assert.ok((await view.state()).triangles < triangles / 2);
+    await view.shot('sheet');
+    const after = new Uint32Array((await view.picture()).rgba.buffer), end = Math.floor(top) * before.width;
+    const changed = after.subarray(0, end).reduce((sum, pixel, i) => sum + (pixel !== pixels[i]), 0);
+    assert.ok(changed > 5000, `${changed} pixels above the sheet change`);
+    assert.deepEqual(view.problems, []);
     await view.close();
 }));
 

@@ -1,11 +1,13 @@
 // viewer_faults.test.mjs - what the page does when the service says no, says nonsense, or is gone.
 import assert from 'node:assert/strict';
 import {execFileSync} from 'node:child_process';
-import {mkdtempSync, rmSync} from 'node:fs';
+import {mkdtempSync, rmSync, writeFileSync} from 'node:fs';
 import {tmpdir} from 'node:os';
 import {join} from 'node:path';
 import {after, before, test} from 'node:test';
 import {DESKTOP, keepingShots, launch, openPage} from './browser.mjs';
+import {BUILD} from './packages.mjs';
+import {differingPixels} from './picture.mjs';
 import {Service, TERRAINS} from './serve.mjs';
 
 let browser;
@@ -43,6 +45,15 @@ test('the service is gone: a sentence; it is back: the page goes on', keepingSho
     await view.setCamera(lost);
     await until(view, shown => shown);
     assert.match(await sentence(view), /does not answer/);
+    const claim = () => view.page.evaluate(() => document.querySelector('#promise').textContent);
+    assert.match(await claim(), /^Nothing is proved/);
+    await view.page.selectOption('#terrain', 'degrees');
+    assert.doesNotMatch(await claim(), /^Proved/);
+    assert.equal(await view.page.textContent('#triangles'), '\u2013');
+    await view.page.selectOption('#terrain', 'metres');
+    await view.setCamera(lost);
+    await view.page.mouse.click(500, 420);
+    await until(view, shown => shown);
     await view.shot('service-gone');
     service = await Service.start({port});
     await until(view, shown => !shown);
@@ -61,12 +72,17 @@ test('more than the service gives: its sentence is shown, and a coarser mesh com
     await until(view, shown => shown);
     assert.match(await sentence(view), /3000/);
     await view.shot('service-says-no');
+    // Nothing is claimed of nothing.
+    const claim = () => document.querySelector('#claim').innerText.trim();
+    assert.equal(await view.page.evaluate(claim), 'Nothing is shown yet.');
+    assert.equal(await view.page.evaluate(() => document.querySelector('#promise').checkVisibility()), false);
     await view.page.focus('#eps');
     await view.page.keyboard.press('End');
     await until(view, shown => !shown);
     await view.settled();
     const {triangles} = await view.state();
     assert.ok(triangles > 0 && triangles <= 3000, `${triangles}`);
+    assert.match(await view.page.evaluate(claim), /triangles[^]*Proved: /);
     await view.close();
     await service.stop();
 }));
@@ -91,7 +107,8 @@ test('damaged answers: a sentence, the mesh before stays, and the page goes on',
         damage = how;
         await view.setCamera({...turn, yaw: turn.yaw + name.length});
         await until(view, shown => shown);
-        assert.ok((await sentence(view)).length > 10, name);
+        assert.match(await sentence(view), /^.{10,}/, name);
+        assert.doesNotMatch(await sentence(view), /undefined|null|properties|function|NaN/, name);
         assert.equal((await view.state()).triangles, triangles, name);
         damage = null;
         await view.setCamera({...turn, yaw: turn.yaw - name.length});
@@ -105,6 +122,24 @@ test('damaged answers: a sentence, the mesh before stays, and the page goes on',
     await service.stop();
 }));
 
+test('the graphics card takes the picture away: a sentence; it is back: the same picture', keepingShots('lost', () => views, async () => {
+    const service = await Service.start(), view = await open(service, {path: '#terrain=metres&wires'}), picture = await view.picture();
+    await view.page.evaluate(() => {
+        window.card = document.querySelector('#picture').getContext('webgl2').getExtension('WEBGL_lose_context');
+        window.card.loseContext();
+    });
+    await until(view, shown => shown);
+    assert.match(await sentence(view), /graphics card/);
+    await view.page.evaluate(() => window.card.restoreContext());
+    await until(view, shown => !shown);
+    await view.settled();
+    assert.equal(differingPixels(picture, await view.picture()), 0);
+    await view.see(await camera(view, 5));
+    assert.deepEqual(view.problems, []);
+    await view.close();
+    await service.stop();
+}));
+
 test('a terrain that is not there: a sentence, and another one', keepingShots('atlantis', () => views, async () => {
     const service = await Service.start(), view = await open(service, {path: '#terrain=atlantis'});
     assert.match(await sentence(view), /atlantis/);
@@ -112,6 +147,20 @@ test('a terrain that is not there: a sentence, and another one', keepingShots('a
     assert.ok((await view.state()).triangles > 100);
     await view.close();
     await service.stop();
+}));
+
+test('a terrain that is all void: it says so, without a complaint', keepingShots('all void', () => views, async () => {
+    const folder = mkdtempSync(join(tmpdir(), 'rqt_web_')), database = join(folder, 'void.gpkg'), raster = join(folder, 'void.asc');
+    writeFileSync(raster, `ncols 3\nnrows 3\nxllcorner 0\nyllcorner 0\ncellsize 10\nNODATA_value -1\n${'-1 -1 -1\n'.repeat(3)}`);
+    execFileSync(join(BUILD, 'rqt'), ['import', '--name', 'void', raster, database], {stdio: 'pipe'});
+    const service = await Service.start({databases: [database]}), view = await open(service, {path: ''});
+    assert.match(await view.page.textContent('#facts'), /all void/);
+    assert.match(await view.page.textContent('#promise'), /nothing to draw/);
+    assert.equal((await view.state()).triangles, 0);
+    assert.deepEqual(view.problems, []);
+    await view.close();
+    await service.stop();
+    rmSync(folder, {recursive: true});
 }));
 
 test('databases without a terrain: a sentence', keepingShots('nothing', () => views, async () => {

@@ -84,9 +84,9 @@ for (const [size, viewport] of Object.entries({desktop: DESKTOP, phone: PHONE}))
         await click(view, b);
         await view.page.waitForSelector('#profile path.curve');
         await view.shot(`profile-${size}`);
-        const {line, eps} = view.lastAsked('/profile').parameters, [from, to] = [await place(a), await place(b)];
+        const {line} = view.lastAsked('/profile').parameters, [from, to] = [await place(a), await place(b)];
         assert.equal(line, `LINESTRING(${from.x} ${from.y},${to.x} ${to.y})`);
-        const rows = await sql('SELECT distance, z FROM rqt_profile(:line, :eps, :terrain)', {line, eps: Number(eps), terrain: 'metres'});
+        const rows = await sql('SELECT distance, z FROM rqt_profile(:line, 0, :terrain)', {line, terrain: 'metres'});
         // The curve has a point for every row: upward by height, to the right by distance, in one scale each.
         const points = (await view.page.getAttribute('#profile path.curve', 'd')).slice(1).split('L').map(p => p.split(',').map(Number));
         assert.equal(points.length, rows.length);
@@ -108,3 +108,18 @@ for (const [size, viewport] of Object.entries({desktop: DESKTOP, phone: PHONE}))
         assert.deepEqual(view.problems, []);
         await view.close();
     }));
+
+test('a height behind the mountain is faint', keepingShots('behind', () => views, async () => {
+    const view = await open('metres', DESKTOP), {camera} = await view.state();
+    await click(view, [Math.round(camera.width * 0.55), Math.round(camera.height * 0.5)]);
+    await view.page.waitForFunction(() => /\d/.test(document.querySelector('#pins text')?.textContent));
+    const opacity = () => view.page.evaluate(() => Number(getComputedStyle(document.querySelector('#pins g')).opacity));
+    await view.settled();
+    assert.equal(await opacity(), 1);
+    await view.see({eye: [camera.eye[0] + 100, 1211500, 3200], yaw: 180, pitch: -15, position: 'crs'});
+    await view.shot('behind');
+    assert.ok(await opacity() < 0.5);
+    await view.see({...camera, yaw: camera.yaw + 3});
+    assert.equal(await opacity(), 1);
+    await view.close();
+}));
