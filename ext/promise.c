@@ -91,6 +91,7 @@ static int begin(promise *p, const request *r, const int32_t box[4], int32_t aro
                    .row = y0,
                    .width = x1 - x0 + 1,
                    .height = y1 - y0 + 1,
+                   .store = r->store,
                    .terrain = r->terrain,
                    .region = r->region,
                    .ends = {x0 == 0, y0 == 0, x1 == last_col, y1 == last_row}};
@@ -158,8 +159,13 @@ static bool is_in_half_cell(const promise *p, int32_t col, int32_t row) {
     return false;
 }
 
+enum { ASKED_AT_A_TIME = 256 }; /* samples between two questions whether to go on */
+
 bool promise_holds(void *context, int32_t col, int32_t row) {
-    const promise *p = context;
+    promise *p = context;
+    /* A region of thousands of edges takes its time for each sample. */
+    if (p->code != SQLITE_OK || (++p->asked % ASKED_AT_A_TIME == 0 && store_is_interrupted(p->store, &p->code)))
+        return false;
     if (!is_valid(p, col, row) || !rqt_region_contains(p->region, (rqt_vertex){col, row})) return false;
     return is_in_half_cell(p, col, row) && (p->reach == 0 || !is_near_void(p, col, row, p->reach));
 }

@@ -19,8 +19,11 @@ typedef struct promise {
     int32_t col, row, width, height; /* of the window */
     int32_t *q;
     uint8_t *valid;
+    store *store;
     const store_terrain *terrain;
     const rqt_region *region;
+    uint32_t asked;  /* of promise_holds */
+    int code;        /* why it has stopped, and what it told is worth nothing; else SQLITE_OK */
     int32_t reach;   /* outline tol: samples this near to a void are not promised; 0: all are */
     bool ends[4];    /* the window's west, north, east, south is the raster's */
     uint32_t *voids; /* (width + 1) * (height + 1): voids north-west of each; NULL without voids, or for `exact` */

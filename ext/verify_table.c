@@ -130,8 +130,10 @@ static int judge(const request *r, const evidence *e, proof *p, char **error) {
         p->x = t->placement.x0 + p->report.worst_col * t->placement.dx;
         p->y = t->placement.y0 + p->report.worst_row * t->placement.dy;
     }
+    const int stopped = window.code;
     promise_free(&window);
     if (status == VERIFY_NO_MEMORY) return SQLITE_NOMEM;
+    if (stopped != SQLITE_OK) return stopped;
     return status == VERIFY_INVALID ? fail(error, "the mesh leaves the raster") : code;
 }
 

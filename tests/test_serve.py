@@ -333,6 +333,21 @@ service.connection.close()
 equal("nor GET with one", ask(HILLS, body=b"a=b").status, 400)
 service.connection.close()
 
+
+def answers_to(head):
+    """How the service takes what a server before it may have taken for one request with a body: the statuses."""
+    raw = socket.create_connection(("127.0.0.1", service.port), timeout=60)
+    raw.sendall(b"GET /healthz HTTP/1.1\r\nHost: a\r\n" + head + b"\r\nGET /conformance HTTP/1.1\r\nHost: b\r\nConnection: close\r\n\r\n")
+    received = b"".join(iter(lambda: raw.recv(65536), b""))
+    raw.close()
+    return [int(status) for status in re.findall(rb"HTTP/1\.1 (\d{3}) ", received)]
+
+
+equal("two requests are two", answers_to(b"Content-Length: 0\r\n"), [200, 200])
+for head in (b"Content-Length: 0\r\nContent-Length: 60\r\n", b"Content-Length: 60\r\nContent-Length: 0\r\n", b"Content-Length : 60\r\n", b"Transfer-Encoding : chunked\r\n",
+             b"Content-Length: 0\r\nTransfer-Encoding: chunked\r\n"):
+    equal("no request hides in another's body (%s)" % head.decode().strip().replace("\r\n", ", "), answers_to(head), [400])
+
 connection = service.connect()
 answers = [ask(HILLS + "/height?x=-71.3&y=44.2", connection=connection).status for _ in range(3)]
 sock = connection.sock
@@ -609,6 +624,50 @@ problems = answer.json().get("problems", [])
 check("but is named", [p["database"] for p in problems] == ["other.gpkg"] and "not a database" in problems[0]["detail"], answer.body[-300:])
 equal("what the other has is answered", ask(PLAIN).body, sql_of(one))
 equal("what neither has may be in the damaged one", ask("/collections/nobody").status, 500)
+equal("it ends", service.stop(), (0, ""))
+
+# a region whose edges are all in every row: each sample takes its time
+zigzag = "POLYGON((%s,-71.5 44.01,-71.99 44.01))" % ",".join("%.4f %s" % (-71.99 + 0.98 * i / 1000, "44.99" if i % 2 else "44.01") for i in range(1001))
+service = Service(DB, "--max-seconds", "1")
+equal("a proof ends with its time", service.ask(HILLS + "/verify", {"eps": 1000, "wkt": zigzag}).status, 503)
+equal("it ends", service.stop(), (0, ""))
+
+# --------------------------------------------------------------------------------------------------- hostile databases
+hostile = s.temp("hostile.gpkg")
+shutil.copy(pristine, hostile)
+harm = s.connect(hostile)
+harm.execute("UPDATE rqt_terrain SET crs = CAST(x'ff222241c0af' AS TEXT) WHERE name = 'plain'")
+harm.close()
+service = Service(hostile)
+equal("text that is no UTF-8 is marked", service.ask("/collections/plain").json()["terrain"]["crs"], '\ufffd""A\ufffd\ufffd')
+equal("it ends", service.stop(), (0, ""))
+shutil.copy(pristine, hostile)
+harm = s.connect(hostile)
+harm.execute("CREATE VIEW rqt_terrains AS SELECT NULL AS name, 'main' AS schema, 1 AS complete, %s FROM (VALUES (1), (2))" %
+             ", ".join("1 AS " + c for c in ("srid width height x0 y0 dx dy cell_x cell_y min_z max_z quantum quantum_error voids blocks bytes max_error k crs crs_name "
+                                             "lonlat metre semi_major inverse_flattening vertical created").split()))
+harm.close()
+service = Service(hostile)
+equal("terrains without a name are none", service.ask("/collections").json().get("collections"), [])
+equal("it ends", service.stop(), (0, ""))
+
+# ---------------------------------------------------------------------------------------- answers that nobody takes
+service = Service(DB, "--memory", "64", "--max-seconds", "1000")
+size = len(sql_bytes("SELECT rqt_mesh(NULL, 12, 'ply', 'hills')"))
+crowd = []
+for _ in range(2 + (64 << 20) // size):
+    lazy = socket.socket()
+    lazy.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    lazy.settimeout(60)
+    lazy.connect(("127.0.0.1", service.port))
+    lazy.sendall(("GET %s/range?eps=12&f=ply HTTP/1.1\r\nHost: a\r\n\r\n" % HILLS).encode())
+    crowd.append(lazy)
+statuses = [int(lazy.recv(12).split()[1]) for lazy in crowd]
+check("answers on their way take no more memory than they may", size > 2 << 20 and set(statuses) == {200, 503} and statuses.count(200) * size <= 64 << 20, (size, statuses))
+equal("small ones are answered", service.ask(HILLS).status, 200)
+for lazy in crowd:
+    lazy.close()
+check("and large ones when those are gone", wait_until(lambda: service.ask(HILLS + "/range?eps=12&f=ply").status == 200))
 equal("it ends", service.stop(), (0, ""))
 
 # ------------------------------------------------------------------------------------------------------- the command

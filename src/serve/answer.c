@@ -25,6 +25,7 @@ static bool buffer_reserve(buffer *b, size_t more) {
     if (b->size + more <= b->capacity) return true;
     size_t capacity = b->capacity ? b->capacity : FIRST_CAPACITY;
     while (capacity < b->size + more) capacity *= 2;
+    if (capacity > b->most) capacity = b->most;
     char *bytes = realloc(b->bytes, capacity);
     b->no_memory = !bytes;
     if (!bytes) return false;
@@ -60,16 +61,33 @@ void buffer_number(buffer *b, double value) {
         buffer_text(b, "null");
 }
 
+/* The character at p; returns where the next one is. */
+static const char *add_character(buffer *b, const char *p) {
+    const int n = utf8_bytes((const unsigned char *)p);
+    if (n)
+        buffer_add(b, p, (size_t)n);
+    else
+        buffer_text(b, "\uFFFD");
+    return p + (n ? n : 1);
+}
+
+void buffer_utf8(buffer *b, const char *text) {
+    for (const char *p = text; *p;) p = add_character(b, p);
+}
+
 void buffer_string(buffer *b, const char *text) {
     buffer_text(b, "\"");
-    for (const char *p = text; *p; p++) {
+    for (const char *p = text; *p;) {
         const unsigned char c = (unsigned char)*p;
-        if (c == '"' || c == '\\')
-            buffer_add(b, (const char[]){'\\', *p}, 2);
-        else if (c < 0x20)
+        if (c >= 0x20 && c != '"' && c != '\\') {
+            p = add_character(b, p);
+            continue;
+        }
+        if (c < 0x20)
             buffer_format(b, "\\u%04x", c);
         else
-            buffer_add(b, p, 1);
+            buffer_add(b, (const char[]){'\\', *p}, 2);
+        p++;
     }
     buffer_text(b, "\"");
 }
@@ -158,7 +176,7 @@ void answer_json(request *r, const char *type, cJSON *json) {
     if (!a->type) a->type = type;
     if (!a->status) a->status = MHD_HTTP_OK;
     if (text) {
-        buffer_text(&a->body, text);
+        buffer_utf8(&a->body, text);
         buffer_text(&a->body, "\n");
     } else {
         a->body.no_memory = true;

@@ -104,6 +104,7 @@ static bool open_database(database *d, request *r) {
         if (code == SQLITE_OK) code = configure(d);
         if (code != SQLITE_OK || (stat(d->path, &after) == 0 && is_same_file(&d->file, &after))) break;
         close_database(d);
+        code = SQLITE_BUSY; /* it changes all the time */
     }
     if (code == SQLITE_OK && d->db) return true;
     answer_failure(r, code, d->db ? sqlite3_errmsg(d->db) : sqlite3_errstr(code));

@@ -151,8 +151,10 @@ void answer_collection(worker *w, request *r) {
 
 static bool holds(const cJSON *collections, const char *name) {
     const cJSON *c;
-    cJSON_ArrayForEach(c, collections) if (strcmp(cJSON_GetObjectItemCaseSensitive(c, "id")->valuestring, name) ==
-                                           0) return true;
+    cJSON_ArrayForEach(c, collections) {
+        const char *id = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(c, "id"));
+        if (id && strcmp(id, name) == 0) return true;
+    }
     return false;
 }
 
@@ -163,9 +165,11 @@ static bool add_terrains(database *d, request *r, cJSON *collections) {
         d, r, "SELECT " COLUMNS " FROM rqt_terrains WHERE +schema = 'main' AND complete ORDER BY name");
     if (!rows) return false;
     int code;
-    while ((code = sqlite3_step(rows)) == SQLITE_ROW)
-        if (!holds(collections, (const char *)sqlite3_column_text(rows, NAME)))
-            cJSON_AddItemToArray(collections, collection_of(rows));
+    while ((code = sqlite3_step(rows)) == SQLITE_ROW) {
+        /* A database may have a view of this name, with whatever in it. */
+        const char *name = (const char *)sqlite3_column_text(rows, NAME);
+        if (name && !holds(collections, name)) cJSON_AddItemToArray(collections, collection_of(rows));
+    }
     if (code == SQLITE_DONE) return true;
     database_failed(d, r, code, NULL);
     return false;

@@ -17,11 +17,14 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
 /* Seconds without a byte; and for taking an answer: so many, and one more for each so many bytes. */
 enum { IDLE_SECONDS = 30, TAKING_SECONDS = 30, TAKING_BYTES = 8192 };
+/* Bytes of an answer that is always sent. */
+enum { SMALL_ANSWER = 65536 };
 
 typedef struct peer {
     struct peer *next, **link;
@@ -34,7 +37,10 @@ struct peers {
     pthread_mutex_t lock;
     peer *first;
     int connections, requests;
+    int asked;       /* requests whose connection is suspended, or was and has not been looked at since */
+    size_t held;     /* bytes of answers on their way */
     bool is_closing; /* every answer is its connection's last */
+    bool is_shut;    /* nothing is asked any more */
 };
 
 /* ------------------------------------------------------------------------------------------------------ peers --
@@ -92,6 +98,55 @@ void http_count(service *s, int *connections, int *requests) {
     *connections = s->peers->connections;
     *requests = s->peers->requests;
     pthread_mutex_unlock(&s->peers->lock);
+}
+
+/* May a connection be suspended? Then it counts until end_asking. */
+static bool begin_asking(request *r) {
+    peers *all = r->service->peers;
+    pthread_mutex_lock(&all->lock);
+    r->is_asked = !all->is_shut;
+    all->asked += r->is_asked;
+    pthread_mutex_unlock(&all->lock);
+    return r->is_asked;
+}
+
+static void end_asking(request *r) {
+    peers *all = r->service->peers;
+    pthread_mutex_lock(&all->lock);
+    all->asked -= r->is_asked;
+    r->is_asked = false;
+    pthread_mutex_unlock(&all->lock);
+}
+
+/* Is there room for the answer beside those that clients have not taken yet? Small ones are let pass: the number
+ * of connections bounds them. */
+static bool hold(request *r, size_t size) {
+    peers *all = r->service->peers;
+    pthread_mutex_lock(&all->lock);
+    const bool fits = size <= SMALL_ANSWER || all->held + size <= (uint64_t)r->service->options.memory;
+    if (fits) {
+        all->held += size;
+        r->held += size;
+    }
+    pthread_mutex_unlock(&all->lock);
+    return fits;
+}
+
+static void let_go(request *r) {
+    peers *all = r->service->peers;
+    pthread_mutex_lock(&all->lock);
+    all->held -= r->held;
+    pthread_mutex_unlock(&all->lock);
+    r->held = 0;
+}
+
+bool http_shut(service *s, bool late) {
+    peers *all = s->peers;
+    pthread_mutex_lock(&all->lock);
+    if (all->asked == 0 && (all->requests == 0 || late)) all->is_shut = true;
+    const bool is_shut = all->is_shut;
+    pthread_mutex_unlock(&all->lock);
+    return is_shut;
 }
 
 void http_sweep(service *s) {
@@ -157,6 +212,8 @@ static enum MHD_Result send_answer(request *r) {
     answer *a = &r->answer;
     peers *all = r->service->peers;
     if (a->body.no_memory) answer_problem(r, MHD_HTTP_SERVICE_UNAVAILABLE, "out of memory");
+    if (!hold(r, a->body.size))
+        answer_problem(r, MHD_HTTP_SERVICE_UNAVAILABLE, "the service is busy with answers on their way: ask again");
     const size_t size = a->body.size;
     metrics_count(r->service->metrics, r, now_seconds() - r->received, size);
     struct MHD_Response *response = MHD_create_response_from_buffer(
@@ -168,7 +225,7 @@ static enum MHD_Result send_answer(request *r) {
         buffer_free(&a->body);
     put_headers(response, r);
     pthread_mutex_lock(&all->lock);
-    if (all->is_closing) put(response, MHD_HTTP_HEADER_CONNECTION, "close");
+    if (all->is_closing || r->has_body) put(response, MHD_HTTP_HEADER_CONNECTION, "close");
     pthread_mutex_unlock(&all->lock);
     set_phase(all, r->connection, PEER_TAKES, TAKING_SECONDS + (double)size / TAKING_BYTES, 0);
     r->phase = REQUEST_SENT;
@@ -204,15 +261,32 @@ static void on_completed(void *context, struct MHD_Connection *connection, void 
     *slot = NULL;
     if (!r) return;
     set_phase(s->peers, connection, PEER_SENDS, s->options.header_seconds, r->phase == REQUEST_NEW ? 0 : -1);
+    end_asking(r);
+    let_go(r);
     buffer_free(&r->answer.body);
     free(r->decoded);
     free(r->target);
     free(r);
 }
 
+/* The name of a header, whatever blanks stand before its colon: there are servers that pass over them. */
+static bool is_header(const char *given, const char *name) {
+    const size_t n = strlen(name);
+    return strncasecmp(given, name, n) == 0 && !given[n + strspn(given + n, " \t")];
+}
+
+static enum MHD_Result look_for_body(void *found, enum MHD_ValueKind kind, const char *name, const char *value) {
+    (void)kind;
+    const bool is_length = is_header(name, MHD_HTTP_HEADER_CONTENT_LENGTH) && (!value || strcmp(value, "0") != 0);
+    if (is_length || is_header(name, MHD_HTTP_HEADER_TRANSFER_ENCODING)) *(bool *)found = true;
+    return MHD_YES;
+}
+
+/* Of any of several headers: a server before us may have gone by another one than the library does. */
 static bool has_body(const request *r) {
-    const char *length = header(r->connection, MHD_HTTP_HEADER_CONTENT_LENGTH);
-    return header(r->connection, MHD_HTTP_HEADER_TRANSFER_ENCODING) || (length && strcmp(length, "0") != 0);
+    bool found = false;
+    MHD_get_connection_values(r->connection, MHD_HEADER_KIND, look_for_body, &found);
+    return found;
 }
 
 /* The headers are complete. An answer now ends the connection, for the library cannot know what of a body there is
@@ -226,7 +300,8 @@ static enum MHD_Result begin(request *r, const char *method) {
     r->if_none_match = header(connection, MHD_HTTP_HEADER_IF_NONE_MATCH);
     r->phase = REQUEST_READ;
     set_phase(r->service->peers, connection, PEER_WAITS, 0, 1);
-    if (!has_body(r)) return MHD_YES;
+    r->has_body = has_body(r);
+    if (!r->has_body) return MHD_YES;
     answer_problem(
         r, strcmp(method, "GET") && strcmp(method, "HEAD") ? MHD_HTTP_METHOD_NOT_ALLOWED : MHD_HTTP_BAD_REQUEST,
         "requests have no body here: GET, HEAD and OPTIONS are what is answered");
@@ -252,6 +327,10 @@ static enum MHD_Result ask(request *r) {
         r->endpoint->answer(NULL, r);
         return send_answer(r);
     }
+    if (!begin_asking(r)) {
+        answer_problem(r, MHD_HTTP_SERVICE_UNAVAILABLE, "the service ends");
+        return send_answer(r);
+    }
     /* Suspended first: the worker may be done before this returns. */
     r->phase = REQUEST_ASKED;
     MHD_suspend_connection(r->connection);
@@ -275,6 +354,7 @@ static enum MHD_Result on_request(void *context, struct MHD_Connection *connecti
     case REQUEST_READ:
         return ask(r);
     case REQUEST_ANSWERED:
+        end_asking(r);
         return send_answer(r);
     default:
         return MHD_YES;

@@ -40,6 +40,8 @@ void buffer_text(buffer *b, const char *text);
 void buffer_format(buffer *b, const char *format, ...) __attribute__((format(printf, 2, 3)));
 /* A number of JSON, the shortest that reads back equal; null for what is not finite. */
 void buffer_number(buffer *b, double value);
+/* A text; bytes that are no UTF-8, as a damaged database may have them, become U+FFFD. */
+void buffer_utf8(buffer *b, const char *text);
 /* A text of JSON. */
 void buffer_string(buffer *b, const char *text);
 void buffer_free(buffer *b);
@@ -89,12 +91,18 @@ typedef struct request {
     const endpoint *endpoint;                                      /* NULL: no such path */
     const char *terrain;                                           /* of the path */
     double received;                                               /* seconds, monotonic */
+    bool has_body;
+    bool is_asked; /* counted as such */
+    size_t held;   /* bytes of its answer on their way, counted too */
     answer answer;
     enum { REQUEST_NEW, REQUEST_READ, REQUEST_ASKED, REQUEST_ANSWERED, REQUEST_SENT } phase;
 } request;
 
 /* The value of a parameter, NULL when it is not given. */
 const char *request_parameter(const request *r, const char *name);
+
+/* Bytes of the UTF-8 character at p, before an end mark; 0: it is overlong, a surrogate or cut off. target.c */
+int utf8_bytes(const unsigned char *p);
 
 /* Path and parameters out of r->target. False: what is wrong is the answer. target.c */
 bool target_read(request *r);
@@ -201,7 +209,7 @@ typedef struct query {
     const char *region; /* as text; NULL: everything */
     void *box;          /* of a box: the geometry; NULL: none. Its text is outline */
     int size;           /* bytes of box */
-    char outline[256];
+    char outline[288];  /* ten numbers of 24 characters */
     const char *format; /* as SQL has it */
 } query;
 /* False: what is wrong is the answer. */
@@ -260,6 +268,9 @@ void http_count(service *s, int *connections, int *requests);
 void http_sweep(service *s);
 /* No new connections, and the ones there are end with their next answer. */
 void http_quiesce(service *s);
+/* True when no request is under way (late: none whose connection is suspended, with which the library cannot stop),
+ * and from then on none is asked. */
+bool http_shut(service *s, bool late);
 void http_end(service *s);
 
 #endif

@@ -51,10 +51,11 @@ static void *work(void *context) {
             endpoint_answer(&seat->worker, r);
         answer_compress(r);
         r->phase = REQUEST_ANSWERED;
+        MHD_resume_connection(r->connection);
+        /* Not before: while somebody works, the library must not be stopped. */
         pthread_mutex_lock(&p->lock);
         p->working--;
         pthread_mutex_unlock(&p->lock);
-        MHD_resume_connection(r->connection);
     }
     return NULL;
 }

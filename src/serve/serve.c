@@ -74,12 +74,13 @@ static void leave(service *s, const sigset_t *signals) {
     http_quiesce(s);
     const double hurry = now_seconds() + s->options.max_seconds, end = hurry + GRACE_SECONDS;
     for (;;) {
-        int connections, requests, waiting, working;
-        http_count(s, &connections, &requests);
-        pool_load(s->pool, &waiting, &working);
+        int waiting, working;
         const double now = now_seconds();
-        /* A suspended connection must be resumed before the library may stop: that much is always waited for. */
-        if (requests == 0 || (now > end && waiting == 0 && working == 0)) break;
+        /* A suspended connection must be resumed before the library may stop, and who resumes it must be done with
+         * that: so much is always waited for. */
+        const bool is_shut = http_shut(s, now > end);
+        pool_load(s->pool, &waiting, &working);
+        if (is_shut && working == 0) break;
         if (now > hurry || wait_for_signal(signals, LEAVING_MILLISECONDS)) pool_hurry(s->pool);
         if (now > hurry) (void)wait_for_signal(signals, LEAVING_MILLISECONDS);
         http_sweep(s);

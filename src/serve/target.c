@@ -17,8 +17,7 @@ static int hex_digit(char c) {
     return -1;
 }
 
-/* Bytes of the UTF-8 character at p, which is overlong, a surrogate or cut off: 0. */
-static int character_bytes(const unsigned char *p) {
+int utf8_bytes(const unsigned char *p) {
     if (p[0] < 0x80) return 1;
     const int n = p[0] >= 0xC2 && p[0] < 0xE0 ? 2 : (p[0] & 0xF0) == 0xE0 ? 3 : p[0] >= 0xF0 && p[0] < 0xF5 ? 4 : 0;
     for (int i = 1; i < n; i++)
@@ -30,7 +29,7 @@ static int character_bytes(const unsigned char *p) {
 
 static bool is_utf8(const char *text) {
     for (const unsigned char *p = (const unsigned char *)text; *p;) {
-        const int n = character_bytes(p);
+        const int n = utf8_bytes(p);
         if (n == 0) return false;
         p += n;
     }

@@ -196,7 +196,7 @@ static void add_errors(input *in, const wire *w, const rqt_allocator *a, fuzz_he
     with.patch.vertices = malloc(n * sizeof *with.patch.vertices + 1);
     if (!with.bytes || !with.patch.vertices) abort();
     memcpy(with.bytes, w->bytes, w->size);
-    memcpy(with.patch.vertices, w->patch.vertices, n * sizeof *with.patch.vertices);
+    if (n > 0) memcpy(with.patch.vertices, w->patch.vertices, n * sizeof *with.patch.vertices);
     for (int odd = take_between(in, 0, 9); odd > 0 && n > 0; odd--)
         with.patch.vertices[take_bits(in, 2) % n].error = (rqt_code)take_bits(in, 2);
     if (went_well(rqt_wire_add_errors(&with.patch, a, with.bytes, &with.size), h)) {
