@@ -153,12 +153,13 @@ function tangentsOf(camera, {origin, positions}) {
  * higher up, and from above where much of the Earth is to be seen.
  * @param box [west, south, east, north] of the CRS
  * @param heights [lowest, highest], exaggerated
- * @param mesh {origin, positions} of geometry.js: what is to be in the picture; null: all that may be between the heights
+ * @param mesh {origin, positions} of geometry.js: what is to be in the picture; null or empty: all that may be between
+ *     the heights
  * @param share of the picture's height, about its middle, that is not covered
  */
 export function lookAtAll(camera, box, heights, mesh = null, share = 1) {
     const {scene} = camera, [x0, y0, x1, y1] = box, span = scene.isSpace ? Math.max(x1 - x0, y1 - y0) : 0;
-    const points = mesh || pointsBetween(scene, box, heights);
+    const points = mesh?.positions.length ? mesh : pointsBetween(scene, box, heights);
     const middle = [(x0 + x1) / 2, (y0 + y1) / 2, (heights[0] + heights[1]) / 2], target = scene.point(middle);
     const most = Math.tan(camera.fovy / 2 * DEGREE), aspect = camera.width / camera.height;
     const steep = 38 + 27 * clamp(share / aspect - 1, 0, 1);
