@@ -526,7 +526,29 @@ touch.close()
 os.utime(one, ns=(before_stat.st_atime_ns, before_stat.st_mtime_ns))
 equal("(a commit, and the file's size and time are what they were)", os.stat(one)[6:9:2], before_stat[6:9:2])
 answer = ask("/collections/plain")
-check("a commit is seen by SQLite's own counter", answer.json()["terrain"]["created"] == "lately" and answer.etag not in (tag, None), answer.headers)
+check("a commit is seen, whatever the file's times say", answer.json()["terrain"]["created"] == "lately" and answer.etag not in (tag, None), answer.headers)
+
+# Two files of one size, one change counter and one time, written over each other.
+with open(one, "rb") as file:
+    original = file.read()
+variants = []
+for created in ("earlier", "to-day."):
+    path = s.temp("variant.gpkg")
+    with open(path, "wb") as file:
+        file.write(original)
+    touch = s.connect(path)
+    touch.execute("UPDATE rqt_terrain SET created = ? WHERE name = 'plain'", (created,))
+    touch.close()
+    with open(path, "rb") as file:
+        variants.append(file.read())
+equal("(variants differ, but not in size and counter)", [len(v) for v in variants] + [v[24:28] for v in variants], [len(original)] * 2 + [variants[0][24:28]] * 2)
+tags = []
+for variant in variants:
+    with open(one, "r+b") as file:
+        file.write(variant)
+    os.utime(one, ns=(before_stat.st_atime_ns, before_stat.st_mtime_ns))
+    tags.append(ask("/collections/plain").etag)
+check("a file that is written over, its time set back, has another tag", tags[0] != tags[1] and None not in tags, tags)
 s.import_terrain(one, higher, name="plain", nodata=-9999, replace=True)
 equal("after an import in its place", {(a[0], a[2]) for a in all_workers(PLAIN)}, {(200, sql_of(one))})
 

@@ -52,9 +52,10 @@ static void close_database(database *d) {
     d->is_damaged = false;
 }
 
+/* By the time of the last change, which nobody can set back as that of the last writing can be. */
 static bool is_same_file(const struct stat *a, const struct stat *b) {
     return a->st_dev == b->st_dev && a->st_ino == b->st_ino && a->st_size == b->st_size &&
-           a->st_mtim.tv_sec == b->st_mtim.tv_sec && a->st_mtim.tv_nsec == b->st_mtim.tv_nsec;
+           a->st_ctim.tv_sec == b->st_ctim.tv_sec && a->st_ctim.tv_nsec == b->st_ctim.tv_nsec;
 }
 
 static int is_late(void *context) {
@@ -124,7 +125,7 @@ static uint64_t add_to_hash(uint64_t hash, const void *bytes, size_t size) {
 /* 0: not known. */
 static uint64_t read_state(const database *d, bool *is_wal) {
     const int64_t file[] = {(int64_t)d->file.st_dev, (int64_t)d->file.st_ino, (int64_t)d->file.st_size,
-                            (int64_t)d->file.st_mtim.tv_sec, (int64_t)d->file.st_mtim.tv_nsec};
+                            (int64_t)d->file.st_ctim.tv_sec, (int64_t)d->file.st_ctim.tv_nsec};
     uint64_t hash = add_to_hash(0xCBF29CE484222325u, file, sizeof file);
     unsigned char header[HEADER_BYTES];
     sqlite3_file *handle = NULL;

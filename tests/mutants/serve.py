@@ -28,7 +28,7 @@ MUTANTS = [
     ("serve: a weight of 0 is a yes", "src/serve/negotiate.c", "return weight[*c] > 0;", "return true;", SERVE, "nothing is acceptable"),
     ("serve: what is packed has the tag of what is not", "src/serve/endpoints.c", 'a->coding == CODING_IDENTITY ? "" : coding_name(a->coding)', '""', SERVE, "a tag of its own"),
     ("serve: a tag is not of the request", "src/serve/endpoints.c", "add_text(add_text(0xCBF29CE484222325u, RQT_VERSION), r->target)", "0xCBF29CE484222325u", SERVE, "a tag of its own"),
-    ("serve: a tag does not know the change counter", "src/serve/database.c", "hash = add_to_hash(hash, header + HEADER_COUNTER, HEADER_BYTES - HEADER_COUNTER);", "", SERVE, "tag"),
+    ("serve: a file's time may be set back", "src/serve/database.c", "(int64_t)d->file.st_ctim.tv_sec, (int64_t)d->file.st_ctim.tv_nsec", "(int64_t)d->file.st_mtim.tv_sec, (int64_t)d->file.st_mtim.tv_nsec", SERVE, "a file that is written over, its time set back, has another tag"),
     ("serve: a tag does not know the log", "src/serve/database.c", "hash = add_to_hash(hash, index, INDEX_BYTES);", "", SERVE, "WAL: each commit has its tag"),
     ("serve: weak tags never match", "src/serve/negotiate.c", 'if (strncmp(p, "W/", 2) == 0) p += 2;', "", SERVE, "If-None-Match W/"),
     ("serve: errors are kept", "src/serve/answer.c", "*a = (answer){.status = status, .type", "*a = (answer){.is_lasting = true, .status = status, .type", SERVE, "kept by nobody"),
