@@ -1,5 +1,6 @@
 /* fuzz_geometry.c - regions: any text, any bytes, words of WKT in any order, geometries of every kind with numbers
- * from anywhere; and what a region then says of boxes, triangles and samples, which must agree. */
+ * from anywhere, unions of squares; and what a region then says of boxes, triangles and samples, which must agree.
+ */
 #include "fuzz.h"
 
 static const char *const words[] = {"POLYGON",
@@ -215,6 +216,45 @@ static void lines(input *in, const rqt_allocator *a, fuzz_heap *h) {
     rqt_geometry_free(geometry);
 }
 
+/* ------------------------------------------------------------------------------------ unions of squares */
+enum { SQUARES = 64 };
+
+/* Squares in Morton order, from the root square down: some taken, some divided, some left out. */
+static size_t take_squares(input *in, rqt_square square, rqt_square *taken, size_t n) {
+    const int what = take_between(in, 0, 5);
+    if (what == 0 || n == SQUARES) return n;
+    if (what == 1 || square.side == 1) {
+        taken[n] = square;
+        return n + 1;
+    }
+    const int32_t half = square.side / 2;
+    for (int i = 0; i < 4; i++)
+        n = take_squares(in, (rqt_square){square.x + i % 2 * half, square.y + i / 2 * half, half}, taken, n);
+    return n;
+}
+
+static void squares(input *in, const rqt_lattice *l, const rqt_allocator *a, fuzz_heap *h) {
+    rqt_square taken[SQUARES];
+    size_t n = take_squares(in, (rqt_square){0, 0, 1 << l->K}, taken, 0);
+    const bool wild = n > 0 && take_between(in, 0, 3) == 0;
+    if (wild) {
+        const size_t i = (size_t)take_between(in, 0, (int)n - 1);
+        taken[i] = (rqt_square){take_between(in, -9, 40), take_between(in, -9, 40), (int32_t)take_bits(in, 4)};
+    }
+    rqt_region *region = NULL;
+    const rqt_status status = rqt_region_of_squares(taken, n, l, a, &region);
+    HOLD(status == RQT_OK || !region, "a region in spite of status %d", (int)status);
+    if ((wild && status == RQT_INVALID) || !went_well(status, h)) return;
+    look(in, region, l);
+    for (size_t i = 0; i < n && !wild; i++) {
+        const rqt_square s = taken[i];
+        const bool is_there = s.x < l->width - 1 && s.y < l->height - 1;
+        const rqt_relation relation = rqt_region_box_relation(region, s.x, s.y, s.x + s.side, s.y + s.side);
+        HOLD(!is_there || relation == RQT_INSIDE, "square %zu is not all inside", i);
+    }
+    rqt_region_free(region);
+}
+
 const long fuzz_runs = 8000;
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
@@ -262,6 +302,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     rqt_geometry_free(geometry);
     in = rest;
     lines(&in, &a, &heap);
+    in = rest;
+    squares(&in, &l, &a, &heap);
     HOLD(heap.live == 0, "%zu bytes leaked", heap.live);
     return 0;
 }
