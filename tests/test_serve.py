@@ -252,7 +252,7 @@ for path, item in sorted(api["paths"].items()):
         left = {key: value for key, value in needed.items() if key != name}
         check("OpenAPI: %s needs %s" % (path, name), "%s" % name in ask(whole, left).detail())
     sentence = ask(whole, {"another": 1}).detail()
-    takes = sorted(sentence.split("it takes")[-1].replace("!", "").replace("none", "").split()) if "takes" in sentence else []
+    takes = sorted(sentence.split("it takes")[-1].replace("none", "").split()) if "takes" in sentence else []
     if "takes" in sentence:
         equal("OpenAPI: %s describes all that it takes" % path, sorted(named), takes)
 f_enum = api["components"]["parameters"]["f"]["schema"]["enum"]

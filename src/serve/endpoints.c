@@ -20,7 +20,7 @@ const endpoint endpoints[] = {
     {"collections", "/collections", " ", answer_collections, false},
     {"collection", TERRAIN, " ", answer_collection, false},
     {"range", TERRAIN "/range", REGION "eps! f " OPTION_NAMES, answer_range, false},
-    {"view", TERRAIN "/view", " camera! f " OPTION_NAMES, answer_view, false},
+    {"view", TERRAIN "/view", " camera! f " VIEW_OPTION_NAMES, answer_view, false},
     {"delta", TERRAIN "/delta", REGION "eps_from! eps_to! ", answer_delta, false},
     {"height", TERRAIN "/height", " x! y! eps ", answer_height, false},
     {"profile", TERRAIN "/profile", " line! eps ", answer_profile, false},
@@ -61,11 +61,22 @@ static int takes(const endpoint *e, const char *name) {
     return 0;
 }
 
+/* " bbox wkt eps", or " none". */
+static void say_parameters(const endpoint *e, char *text, size_t room) {
+    size_t n = 0;
+    for (const char *p = e->parameters; *p && n + 1 < room; p++)
+        if (*p != '!' && (*p != ' ' || p[1])) text[n++] = *p;
+    text[n] = '\0';
+    if (n == 0) snprintf(text, room, " none");
+}
+
 static bool check_parameters(request *r) {
     for (int i = 0; i < r->parameter_count; i++)
         if (!takes(r->endpoint, r->parameters[i].name)) {
+            char known[256];
+            say_parameters(r->endpoint, known, sizeof known);
             answer_problem(r, MHD_HTTP_BAD_REQUEST, "%s takes no parameter \"%s\"; it takes%s", r->endpoint->path,
-                           r->parameters[i].name, r->endpoint->parameters[1] ? r->endpoint->parameters : " none");
+                           r->parameters[i].name, known);
             return false;
         }
     for (const char *p = r->endpoint->parameters; (p = strchr(p, '!')) != NULL; p++) {

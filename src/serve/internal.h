@@ -219,9 +219,10 @@ void query_bind(const query *q, sqlite3_stmt *statement);
 void query_free(query *q);
 /* The whole text as a number of JSON, or 9e999 and the like. */
 bool number_read(const char *text, double *value);
-/* Names of options that may be given on their own, between blanks. */
-#define OPTION_NAMES \
-    "options mode outline metric select strip detail max_vertices max_triangles frame test cover previous "
+/* Names of options that may be given on their own, between blanks: of regions, and those that views have besides.
+ */
+#define OPTION_NAMES "options mode outline metric select strip detail max_vertices frame "
+#define VIEW_OPTION_NAMES OPTION_NAMES "max_triangles test cover previous "
 
 void answer_landing(worker *w, request *r);
 void answer_openapi(worker *w, request *r);

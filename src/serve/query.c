@@ -55,7 +55,7 @@ static bool check_numbers(request *r) {
 /* --------------------------------------------------------------------------------------------------- options -- */
 
 static bool is_option(const char *name) {
-    static const char names[] = " " OPTION_NAMES;
+    static const char names[] = " " VIEW_OPTION_NAMES;
     const size_t n = strlen(name);
     for (const char *p = names; (p = strstr(p, name)) != NULL; p += n)
         if (p[-1] == ' ' && p[n] == ' ') return strcmp(name, "options") != 0;
