@@ -12,7 +12,7 @@ MUTANTS = [
     ("serve: a triangle of GeoJSON is open", "src/serve/meshes.c", "corner < 4; corner++", "corner < 3; corner++", SERVE, "range as GeoJSON"),
     ("serve: the last column of what is told is lost", "src/serve/meshes.c", "for (int i = ROW_COLUMNS; i < columns && count == 0; i++)", "for (int i = ROW_COLUMNS + 1; i < columns && count == 0; i++)", SERVE,
      "JSON says the same"),
-    ("serve: two databases of one name are mixed", "src/serve/documents.c", "if (!holds(collections,", "if (1 || !holds(collections,", SERVE, "of one name the first one's"),
+    ("serve: two databases of one name are mixed", "src/serve/documents.c", "if (name && !holds(collections,", "if (name || !holds(collections,", SERVE, "of one name the first one's"),
     # what is asked
     ("serve: a parameter may come twice", "src/serve/target.c", "if (request_parameter(r, next->name)) {", "if (0) {", SERVE, "eps=1&eps=2"),
     ("serve: any parameter is taken", "src/serve/endpoints.c", "if (!takes(r->endpoint, r->parameters[i].name)) {", "if (0) {", SERVE, "size=2"),
@@ -22,7 +22,7 @@ MUTANTS = [
     ("serve: hexadecimal is a number", "src/serve/query.c", "    if (*p) return false;\n", "", SERVE, "0x10"),
     ("serve: a long target is read", "src/serve/target.c", "if (length > MOST_TARGET) {", "if (0) {", SERVE, "414"),
     ("serve: any method gets an answer", "src/serve/http.c", 'if (strcmp(r->method, "GET") != 0 && strcmp(r->method, "HEAD") != 0) {', "if (0) {", SERVE, "is not answered"),
-    ("serve: a body is passed over", "src/serve/http.c", "if (!has_body(r)) return MHD_YES;", "return MHD_YES;", SERVE, "with one"),
+    ("serve: a body is passed over", "src/serve/http.c", "if (!r->has_body) return MHD_YES;", "return MHD_YES;", SERVE, "with one"),
     # negotiation and tags
     ("serve: weights do not count", "src/serve/negotiate.c", "e->weight = read_weight(p + 2);", "e->weight = 1000;", SERVE, "Accept-Encoding"),
     ("serve: a weight of 0 is a yes", "src/serve/negotiate.c", "return weight[*c] > 0;", "return true;", SERVE, "nothing is acceptable"),
@@ -43,7 +43,11 @@ MUTANTS = [
     ("serve: damage is the client's fault", "src/serve/answer.c", "    case SQLITE_CORRUPT:\n", "", SERVE, "500 with a sentence"),
     ("serve: one damaged database hides the others", "src/serve/documents.c", "if (failed < w->database_count) {", "if (!failed) {", SERVE, "does not hide"),
     ("serve: a folder is told", "src/serve/database.c", "slash ? slash + 1 : path", "path", SERVE, "tells no folder"),
-    ("serve: the end does not wait", "src/serve/serve.c", "if (requests == 0 ||", "pool_hurry(s->pool); if (requests == 0 ||", SERVE, "under way at SIGINT"),
+    ("serve: the end does not wait", "src/serve/serve.c", "if (now > hurry || wait_for_signal(signals, LEAVING_MILLISECONDS)) pool_hurry(s->pool);", "pool_hurry(s->pool);", SERVE, "under way at SIGINT"),
     ("serve: slow clients stay", "src/serve/http.c", "if (p->phase != PEER_WAITS && now > p->until)", "if (0)", HOSTILE, "slow clients"),
-    ("serve: a problem is no JSON", "src/serve/answer.c", "if (c == '\"' || c == '\\\\')", "if (0)", HOSTILE, "whole and well formed"),
+    ("serve: a problem is no JSON", "src/serve/answer.c", "if (c >= 0x20 && c != '\"' && c != '\\\\') {", "if (c >= 0x20) {", HOSTILE, "whole and well formed"),
+    ("serve: a proof goes on after its time", "ext/promise.c", "++p->asked % ASKED_AT_A_TIME == 0", "0", SERVE, "a proof ends with its time"),
+    ("serve: answers that nobody reads take any memory", "src/serve/http.c", "const bool fits = size <= SMALL_ANSWER ||", "const bool fits = true ||", SERVE, "answers on their way take no more memory"),
+    ("serve: the first of two lengths counts", "src/serve/http.c", "*(bool *)found = true;", "*(bool *)found = is_length;", SERVE, "no request hides"),
+    ("serve: bytes that are no UTF-8 go out", "src/serve/answer.c", "buffer_text(b, \"\\uFFFD\");", "buffer_text(b, \"?\");", SERVE, "text that is no UTF-8 is marked"),
 ]
