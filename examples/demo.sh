@@ -61,6 +61,6 @@ cat <<END
 Look at $out/mount-washington.png. Then ask the database yourself:
   sqlite3 $out/white-mountains.gpkg -cmd '.load $build/rqt.so'
   sqlite> SELECT * FROM rqt_help;
-Or see it in a browser: this answers over HTTP until Ctrl-C, and prints the address of its page:
+Or see it in a browser, at http://127.0.0.1:8080/ after this, until Ctrl-C (make serve-demo is short for it):
   $build/rqt serve $out/white-mountains.gpkg
 END
