@@ -66,14 +66,14 @@ row() { # title rqt-figures nginx-figures bytes
 row "request" "bytes" "req/s" "p99 ms" "nginx/s" "p99 ms" ""
 for kind in height rqt strip obj json view; do
     variants "$kind" >"$OUT/paths"
-    rm -f "$OUT"/www/*
+    mkdir "$OUT/www/$kind" # nginx keeps files open by their names
     n=0
     while read -r path; do
-        curl -sf "${url%/}$path" -o "$OUT/www/$n"
-        echo "/$n"
+        curl -sf "${url%/}$path" -o "$OUT/www/$kind/$n"
+        echo "/$kind/$n"
         n=$((n + 1))
     done <"$OUT/paths" >"$OUT/files"
-    bytes=$(($(cat "$OUT"/www/* | wc -c) / n))
+    bytes=$(($(cat "$OUT/www/$kind"/* | wc -c) / n))
     read -r rps p99 bad < <(measure "${url%/}" "$OUT/paths")
     read -r static static99 static_bad < <(measure http://127.0.0.1:18099 "$OUT/files")
     case $kind in height) what="a height" ;; view) what="a view, tau 4 px, rqt" ;; *) what="range 8 km, eps 10 m, $kind" ;; esac
