@@ -1,7 +1,8 @@
 #!/bin/bash
 # check_layers.sh - the arrows between the rooms point one way, and the libraries mention only what they may.
 #
-# core <- store <- ext <- serve <- cli;  core <- store <- import <- cli;  core <- format <- ext;  geo and verify <- ext;  store <- text <- picture <- serve, cli.
+# core <- store <- ext <- serve <- cli;  core <- store <- import <- cli;  core <- format <- ext;  geo and verify <- ext;  store <- text <- picture <- serve, cli;
+# store, format, geo <- tiles <- serve, cli.
 set -u
 BUILD=${BUILD:-build}
 passed=0 failed=0
@@ -20,19 +21,20 @@ may_see() {
     ext) echo ext store core format geo verify ;;
     text) echo text store core ;;
     picture) echo picture text store core ;;
-    serve) echo serve ext core format picture ;;
-    cli) echo cli serve picture text import ext store core format geo verify ;;
+    tiles) echo tiles store core format geo ;;
+    serve) echo serve ext core format picture tiles ;;
+    cli) echo cli serve tiles picture text import ext store core format geo verify ;;
     esac
 }
 room_of_header() { # name, room that includes it
-    for room in $2 core store format geo verify import ext text picture serve cli; do
+    for room in $2 core store format geo verify import ext text picture tiles serve cli; do
         dir=src/$room; [ "$room" = ext ] && dir=ext
         [ -e "$dir/$1" ] && { echo "$room"; return; }
     done
     echo system
 }
 wrong=
-for room in core store format geo verify import ext text picture serve cli; do
+for room in core store format geo verify import ext text picture tiles serve cli; do
     dir=src/$room; [ "$room" = ext ] && dir=ext
     for file in "$dir"/*.[ch] "$dir"/*.cpp; do
         [ -e "$file" ] || continue

@@ -26,7 +26,7 @@ typedef struct cli_command {
 } cli_command;
 
 extern const cli_command command_import, command_update, command_info, command_check, command_verify, command_mesh,
-    command_serve, command_chart;
+    command_serve, command_tiles, command_chart;
 
 /* ------------------------------------------------------------------------------------ sentences (main.c) -- */
 /* The command whose name goes before every sentence. */
@@ -103,10 +103,12 @@ typedef struct cli_progress {
     bool shown; /* stderr is a terminal */
     bool dirty; /* there is a line to wipe */
     char stage[32];
+    const char *unit;   /* of what is counted; NULL: millions of samples */
     double start, last; /* seconds */
 } cli_progress;
 void cli_progress_begin(cli_progress *progress);
-void cli_progress_show(cli_progress *progress, const char *stage, double done, int64_t samples);
+/* done: the share of `count` samples, or units. */
+void cli_progress_show(cli_progress *progress, const char *stage, double done, int64_t count);
 void cli_progress_wipe(cli_progress *progress);
 double cli_seconds(void); /* of a clock that only goes forward */
 

@@ -11,8 +11,9 @@
 #include <stdio.h>
 #include <string.h>
 
-static const cli_command *const COMMANDS[] = {&command_import, &command_update, &command_info,  &command_check,
-                                              &command_verify, &command_mesh,   &command_serve, &command_chart};
+static const cli_command *const COMMANDS[] = {&command_import, &command_update, &command_info,
+                                              &command_check,  &command_verify, &command_mesh,
+                                              &command_serve,  &command_tiles,  &command_chart};
 enum { COMMAND_COUNT = sizeof COMMANDS / sizeof *COMMANDS };
 
 const cli_command *cli_current;
@@ -87,7 +88,7 @@ static const cli_command *find(const char *name) {
 
 static int dispatch(int argc, char **argv) {
     if (argc < 2)
-        return cli_usage("a command is missing: import, update, info, check, verify, mesh, serve or chart");
+        return cli_usage("a command is missing: import, update, info, check, verify, mesh, serve, tiles or chart");
     const char *name = argv[1];
     if (!strcmp(name, "--help") || !strcmp(name, "-h") || (!strcmp(name, "help") && argc == 2))
         return help_of_all();
@@ -97,7 +98,7 @@ static int dispatch(int argc, char **argv) {
     const cli_command *command = find(name);
     if (!command)
         return cli_usage(
-            "there is no %s %s: the commands are import, update, info, check, verify, mesh, serve and chart",
+            "there is no %s %s: the commands are import, update, info, check, verify, mesh, serve, tiles and chart",
             name[0] == '-' ? "option" : "command", name);
     cli_current = command;
     char ask[] = "--help", *const asking[] = {argv[1], ask, NULL};

@@ -31,7 +31,7 @@ static int bar_width(void) {
     return rest < 4 ? 0 : rest > 40 ? 40 : rest;
 }
 
-void cli_progress_show(cli_progress *p, const char *stage, double done, int64_t samples) {
+void cli_progress_show(cli_progress *p, const char *stage, double done, int64_t count) {
     if (!p->shown) return;
     const double now = cli_seconds();
     if (strncmp(p->stage, stage, sizeof p->stage - 1)) {
@@ -54,7 +54,8 @@ void cli_progress_show(cli_progress *p, const char *stage, double done, int64_t 
     fprintf(stderr, "%3.0f %%", floor(done * 100));
     if (spent > SETTLE && done > 0) {
         const double left = spent / done * (1 - done);
-        fprintf(stderr, "  %.1f Msamples/s", (double)samples * done / spent / 1e6);
+        const double rate = (double)count * done / spent;
+        fprintf(stderr, "  %.1f %s/s", p->unit ? rate : rate / 1e6, p->unit ? p->unit : "Msamples");
         if (left < 360000) fprintf(stderr, "  %d:%02d left", (int)left / 60, (int)left % 60);
     }
     fputs("\033[K", stderr);

@@ -144,9 +144,12 @@ extern "C" void geo_frame_free(geo_frame *frame) {
     delete frame;
 }
 
+extern "C" double geo_frame_height(const geo_frame *frame, const double lonlath[3]) {
+    return lonlath[2] + (frame->geoid ? frame->undulation(lonlath[0], lonlath[1]) : 0);
+}
+
 extern "C" void geo_frame_place(const geo_frame *frame, const double lonlath[3], double xyz[3]) {
-    const double lon = lonlath[0], lat = lonlath[1];
-    const double h = lonlath[2] + (frame->geoid ? frame->undulation(lon, lat) : 0);
+    const double lon = lonlath[0], lat = lonlath[1], h = geo_frame_height(frame, lonlath);
     if (frame->kind == GEO_ECEF)
         frame->geocentric.Forward(lat, lon, h, xyz[0], xyz[1], xyz[2]);
     else

@@ -105,6 +105,8 @@ int geo_frame_create(geo_frame_kind kind, const geo_ellipsoid *ellipsoid, double
 void geo_frame_free(geo_frame *frame);
 /* Finite, unless the geoid has no value there. */
 void geo_frame_place(const geo_frame *frame, const double lonlath[3], double xyz[3]);
+/* The height above the ellipsoid; not finite where the geoid has no value. */
+double geo_frame_height(const geo_frame *frame, const double lonlath[3]);
 /* Back. */
 void geo_frame_lonlath(const geo_frame *frame, const double xyz[3], double lonlath[3]);
 

@@ -1,0 +1,123 @@
+/* command_tiles.c - rqt tiles: the tiles of a terrain as files, by the room tiles. */
+#include "cli.h"
+#include "tiles.h"
+
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+static const char HELP[] =
+    "rqt tiles: a terrain as quantized-mesh tiles for globes (Cesium and others), each with a proven error\n"
+    "\n"
+    "Usage: rqt tiles DATABASE -o FOLDER [OPTION...]\n"
+    "\n"
+    "Writes FOLDER/z/x/y.terrain and FOLDER/layer.json, the same bytes that rqt serve answers with. For terrains "
+    "in\n"
+    "longitude and latitude on WGS 84. What is in the folder already is not made again: after a kill the same "
+    "command\n"
+    "goes on there. layer.json comes last.\n"
+    "\n"
+    "Options:\n"
+    "  -o, --output FOLDER  made if it is not there\n"
+    "  --terrain T          of several terrains\n"
+    "  --levels A-B         levels A to B, or one (default: 0 to the first whose tiles have at most 64 samples a "
+    "side)\n"
+    "  --gzip               tiles compressed, to be served with Content-Encoding: gzip\n"
+    "  --jobs J             workers (default: one for each processor)\n"
+    "  --help               this text\n"
+    "\n"
+    "Examples:\n"
+    "  rqt tiles washington.gpkg -o tiles\n"
+    "  rqt tiles alps.gpkg --terrain swiss --levels 0-12 --gzip -o /srv/www/tiles\n";
+
+static const struct option OPTIONS[] = {{"output", required_argument, NULL, 'o'},
+                                        {"terrain", required_argument, NULL, 't'},
+                                        {"levels", required_argument, NULL, 'l'},
+                                        {"gzip", no_argument, NULL, 'g'},
+                                        {"jobs", required_argument, NULL, 'j'},
+                                        {"help", no_argument, NULL, 'h'},
+                                        {NULL, 0, NULL, 0}};
+
+/* "3-7" or "5". */
+static bool read_levels(const char *text, tiles_job *job) {
+    char from[16];
+    int64_t first, last;
+    const char *minus = strchr(text, '-');
+    if (minus && (minus == text || (size_t)(minus - text) >= sizeof from)) return false;
+    snprintf(from, sizeof from, "%.*s", minus ? (int)(minus - text) : 15, text);
+    if (!cli_integer(from, 0, TILES_LEVELS - 1, &first)) return false;
+    if (!cli_integer(minus ? minus + 1 : text, first, TILES_LEVELS - 1, &last)) return false;
+    job->first = (int)first;
+    job->last = (int)last;
+    return true;
+}
+
+static sqlite3 *connect(void *context) {
+    return cli_open(context);
+}
+
+static cli_progress progress;
+
+static bool show(void *context, int64_t done, int64_t all) {
+    (void)context;
+    cli_progress_show(&progress, "tiles", all ? (double)done / (double)all : 1, all);
+    return true;
+}
+
+static int write_tiles(tiles_job *job) {
+    char *error = NULL;
+    tiles_report report;
+    const double start = cli_seconds();
+    cli_progress_begin(&progress);
+    progress.unit = "tiles";
+    const int code = tiles_write(job, &report, &error);
+    cli_progress_wipe(&progress);
+    if (code == SQLITE_CANTOPEN && !error) return CLI_FAILED; /* cli_open has said why */
+    if (code != SQLITE_OK) return cli_fail_store(code, error);
+    const double seconds = cli_seconds() - start;
+    if (isatty(STDERR_FILENO))
+        cli_say("levels %d to %d: %lld tiles, %lld written, %lld bytes, %.2f s", job->first, report.finest,
+                (long long)report.tiles, (long long)report.written, (long long)report.bytes, seconds);
+    return CLI_OK;
+}
+
+static int run(int argc, char **argv) {
+    const long processors = sysconf(_SC_NPROCESSORS_ONLN);
+    tiles_job job = {.last = TILES_LEVELS - 1,
+                     .workers = processors > 0 && processors <= 64 ? (int)processors : 1,
+                     .connect = connect,
+                     .progress = show};
+    for (int option; (option = cli_option(argc, argv, "o:h", OPTIONS)) != -1;) {
+        int64_t n;
+        switch (option) {
+        case 'o':
+            job.folder = optarg;
+            break;
+        case 't':
+            job.terrain = optarg;
+            break;
+        case 'l':
+            if (!read_levels(optarg, &job))
+                return cli_usage("--levels %s: two levels like 0-12, or one, of 0 to %d", optarg, TILES_LEVELS - 1);
+            break;
+        case 'g':
+            job.gzip = true;
+            break;
+        case 'j':
+            if (!cli_integer(optarg, 1, 64, &n)) return cli_usage("--jobs %s: a whole number from 1 to 64", optarg);
+            job.workers = (int)n;
+            break;
+        case 'h':
+            return cli_help(HELP);
+        default:
+            return CLI_USAGE; /* cli_option has said why */
+        }
+    }
+    if (argc - optind != 1) return cli_usage(argc == optind ? "a database is missing" : "one database at a time");
+    if (!job.folder) return cli_usage("-o FOLDER is missing: where the tiles go");
+    job.database = argv[optind];
+    job.context = argv[optind];
+    return write_tiles(&job);
+}
+
+const cli_command command_tiles = {"tiles", "a terrain as tiles for globes (quantized-mesh)", run};

@@ -1,0 +1,175 @@
+/* encode.c - the bytes of a tile, quantized-mesh 1.0 (little-endian):
+ *
+ *     header      88 bytes: centre, heights, sphere, horizon point
+ *     vertices    count; u, v, height, each as differences from the one before, zigzag, 16 bits
+ *     triangles   padding to the size of an index; count; indices by high-water mark, 16 bits, 32 when there are
+ *                 more than 65536 vertices
+ *     sides       west, south, east, north: count, indices
+ *     extensions  id (1 byte), length (4): 1 oct-encoded normals, 2 water mask (terrains with a sea), 4 metadata
+ *
+ * A vertex has the number of its first use, as the cut has numbered it: so each new one is the next, which is what
+ * the high-water mark wants.
+ */
+#include "internal.h"
+
+#include "format.h"
+
+#include <stdio.h>
+#include <string.h>
+
+enum { HEADER = 88, SMALL_INDICES = 65536, NORMALS = 1, WATER = 2, METADATA = 4 };
+
+typedef struct writer {
+    uint8_t *bytes;
+    size_t size, capacity;
+    bool no_memory;
+} writer;
+
+static void put(writer *w, const void *bytes, size_t size) {
+    if (w->no_memory) return;
+    if (w->size + size > w->capacity) {
+        const size_t capacity = 2 * (w->size + size);
+        uint8_t *more = sqlite3_realloc64(w->bytes, capacity);
+        w->no_memory = !more;
+        if (!more) return;
+        w->bytes = more;
+        w->capacity = capacity;
+    }
+    memcpy(w->bytes + w->size, bytes, size);
+    w->size += size;
+}
+
+/* The low bytes of a number. */
+static void put_number(writer *w, uint64_t n, size_t size) {
+    uint8_t bytes[8];
+    for (size_t i = 0; i < size; i++) bytes[i] = (uint8_t)(n >> 8 * i);
+    put(w, bytes, size);
+}
+
+static void put_double(writer *w, double value) {
+    uint64_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    put_number(w, bits, sizeof bits);
+}
+
+static void put_float(writer *w, float value) {
+    uint32_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    put_number(w, bits, sizeof bits);
+}
+
+static void put_header(writer *w, const tile_plan *plan, const tile_globe *globe) {
+    for (int k = 0; k < 3; k++) put_double(w, globe->centre[k]);
+    put_float(w, (float)plan->lowest);
+    put_float(w, (float)(plan->lowest + TILE_UNITS * plan->step));
+    for (int k = 0; k < 3; k++) put_double(w, globe->centre[k]);
+    put_double(w, globe->radius);
+    for (int k = 0; k < 3; k++) put_double(w, globe->horizon[k]);
+}
+
+static void put_differences(writer *w, const uint16_t *values, size_t count) {
+    int before = 0;
+    for (size_t i = 0; i < count; i++) {
+        const int by = values[i] - before;
+        put_number(w, (uint32_t)(by < 0 ? -2 * by - 1 : 2 * by), 2);
+        before = values[i];
+    }
+}
+
+static void put_triangles(writer *w, const rqt_cut *cut, size_t index) {
+    uint32_t highest = 0;
+    while (w->size % index) put_number(w, 0, 1);
+    put_number(w, cut->triangle_count, 4);
+    for (size_t i = 0; i < 3 * cut->triangle_count; i++) {
+        put_number(w, highest - cut->triangles[i], index);
+        highest += cut->triangles[i] == highest;
+    }
+}
+
+static void put_sides(writer *w, const tile_mesh *mesh, size_t index) {
+    for (int side = 0; side < 4; side++) {
+        put_number(w, mesh->edge_count[side], 4);
+        for (uint32_t i = 0; i < mesh->edge_count[side]; i++) put_number(w, mesh->edge[side][i], index);
+    }
+}
+
+static int put_normals(writer *w, tiles *t, const tile_mesh *mesh, char **error) {
+    const size_t size = 2 * mesh->cut.vertex_count;
+    uint8_t *packed = sqlite3_malloc64(size + 1);
+    const int code = packed ? globe_normals(t, mesh, packed, error) : SQLITE_NOMEM;
+    if (code == SQLITE_OK) {
+        put_number(w, NORMALS, 1);
+        put_number(w, size, 4);
+        put(w, packed, size);
+    }
+    sqlite3_free(packed);
+    return code;
+}
+
+static void put_water(writer *w, const tiles *t, const tile_place *place) {
+    uint8_t mask[WATER_SIDE * WATER_SIDE];
+    const size_t size = water_mask(t, place, mask);
+    put_number(w, WATER, 1);
+    put_number(w, size, 4);
+    put(w, mask, size);
+}
+
+/* What the tile is off. */
+static void put_metadata(writer *w, const tile_plan *plan, const tile_place *place, const tile_mesh *mesh) {
+    const tile_level *level = &plan->level[place->z];
+    uint16_t low = TILE_UNITS, high = 0;
+    for (size_t i = 0; i < mesh->cut.vertex_count; i++) {
+        if (mesh->h[i] < low) low = mesh->h[i];
+        if (mesh->h[i] > high) high = mesh->h[i];
+    }
+    const struct {
+        const char *name;
+        double value;
+    } members[] = {{"geometricError", level->geometric_error},
+                   {"error", mesh->error},
+                   {"verticalError", mesh->vertical_error},
+                   {"eps", level->eps},
+                   {"heightStep", plan->step},
+                   {"minimumHeight", plan->lowest + low * plan->step},
+                   {"maximumHeight", plan->lowest + high * plan->step}};
+    char json[512], *end = json;
+    for (size_t i = 0; i < sizeof members / sizeof *members; i++) {
+        char number[32];
+        format_double(members[i].value, number);
+        end += sprintf(end, "%s\"%s\":%s", i ? "," : "{", members[i].name, number);
+    }
+    end += sprintf(end, "}");
+    const size_t size = (size_t)(end - json);
+    put_number(w, METADATA, 1);
+    put_number(w, size + 4, 4);
+    put_number(w, size, 4);
+    put(w, json, size);
+}
+
+int encode_tile(tiles *t, const tile_place *place, const tile_mesh *mesh, tile_bytes *out, char **error) {
+    const rqt_cut *cut = &mesh->cut;
+    const size_t index = cut->vertex_count > SMALL_INDICES ? 4 : 2;
+    tile_globe globe;
+    int code = globe_make(mesh, &globe);
+    if (code != SQLITE_OK) return code;
+    writer w = {.capacity = 4096 + HEADER + 8 * cut->vertex_count + (3 * cut->triangle_count + 1024) * index};
+    w.bytes = sqlite3_malloc64(w.capacity);
+    w.no_memory = !w.bytes;
+    put_header(&w, t->plan, &globe);
+    put_number(&w, cut->vertex_count, 4);
+    put_differences(&w, mesh->u, cut->vertex_count);
+    put_differences(&w, mesh->v, cut->vertex_count);
+    put_differences(&w, mesh->h, cut->vertex_count);
+    put_triangles(&w, cut, index);
+    put_sides(&w, mesh, index);
+    code = put_normals(&w, t, mesh, error);
+    if (t->plan->has_sea) put_water(&w, t, place);
+    put_metadata(&w, t->plan, place, mesh);
+    globe_free(&globe);
+    if (code == SQLITE_OK && w.no_memory) code = SQLITE_NOMEM;
+    if (code == SQLITE_OK)
+        *out = (tile_bytes){w.bytes, w.size};
+    else
+        sqlite3_free(w.bytes);
+    return code;
+}

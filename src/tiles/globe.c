@@ -1,0 +1,165 @@
+/* globe.c - a tile in space: places of its vertices, the sphere around them, the point by which clients know that
+ * all of it is below the horizon, normals.
+ *
+ * Horizon. In the space in which the ellipsoid is a sphere of radius 1 (x/a, y/a, z/b), a point at the distance m
+ * from the centre, at the angle t from a direction D, is hidden from every camera from which the point r D is
+ * hidden, where
+ *
+ *     r = 1 / cos(t + acos(1/m)),      m no less than 1, t + acos(1/m) below a right angle
+ *
+ * for the sphere hides a point at angle s from the camera's direction iff s > acos(1/m) + acos(1/camera). What is
+ * hidden from a camera is convex (the part beyond the horizon's plane of a cone), so the largest r of all vertices
+ * will do for the triangles between them, and points below the ellipsoid, taken as if they were on it, are hidden
+ * later than they could be. Where a vertex is a right angle away no such point exists. Then it is put so far out
+ * that the square of its distance is no double: the tests of clients, which divide by that, never find it hidden.
+ *
+ * Normals are the terrain's, from the full-resolution samples (store_normals), turned from east, north, up to
+ * geocentric; between samples, where a side cuts a triangle, they are the mean of the four around by nearness. What
+ * neighbours share depends on the place alone.
+ */
+#include "internal.h"
+
+#include <math.h>
+#include <string.h>
+
+#define DEGREE 0.017453292519943295
+#define A 6378137.0
+#define F (1 / 298.257223563)
+#define B (A * (1 - F))
+#define NEVER_HIDDEN 1e200
+
+static double dot(const double a[3], const double b[3]) {
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static void place_all(const tile_mesh *mesh, double *xyz) {
+    const double e2 = F * (2 - F);
+    for (size_t i = 0; i < mesh->cut.vertex_count; i++) {
+        const double *p = mesh->lonlath + 3 * i;
+        const double lon = p[0] * DEGREE, lat = p[1] * DEGREE, sine = sin(lat), cosine = cos(lat);
+        const double n = A / sqrt(1 - e2 * sine * sine);
+        xyz[3 * i] = (n + p[2]) * cosine * cos(lon);
+        xyz[3 * i + 1] = (n + p[2]) * cosine * sin(lon);
+        xyz[3 * i + 2] = (n * (1 - e2) + p[2]) * sine;
+    }
+}
+
+static void find_sphere(const double *xyz, size_t count, tile_globe *globe) {
+    double low[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, high[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL}, most = 0;
+    for (size_t i = 0; i < 3 * count; i++) {
+        low[i % 3] = fmin(low[i % 3], xyz[i]);
+        high[i % 3] = fmax(high[i % 3], xyz[i]);
+    }
+    for (int k = 0; k < 3; k++) globe->centre[k] = (low[k] + high[k]) / 2;
+    for (size_t i = 0; i < count; i++) {
+        const double *p = xyz + 3 * i;
+        const double from[3] = {p[0] - globe->centre[0], p[1] - globe->centre[1], p[2] - globe->centre[2]};
+        most = fmax(most, dot(from, from));
+    }
+    globe->radius = sqrt(most) * (1 + 1e-9) + 1e-6;
+}
+
+static void find_horizon(const double *xyz, size_t count, tile_globe *globe) {
+    double direction[3] = {globe->centre[0] / A, globe->centre[1] / A, globe->centre[2] / B}, most = 0;
+    const double length = sqrt(dot(direction, direction));
+    bool exists = length > 0;
+    for (int k = 0; k < 3; k++) direction[k] = exists ? direction[k] / length : k == 0;
+    for (size_t i = 0; i < count && exists; i++) {
+        const double p[3] = {xyz[3 * i] / A, xyz[3 * i + 1] / A, xyz[3 * i + 2] / B};
+        const double square = dot(p, p), m2 = fmax(1, square), along = dot(p, direction) / sqrt(square);
+        const double across = sqrt(fmax(0, 1 - along * along)); /* of the angle t */
+        /* cos(t + acos(1/m)) */
+        const double cosine = (along - across * sqrt(m2 - 1)) / sqrt(m2);
+        exists = cosine > 1e-6;
+        if (exists) most = fmax(most, 1 / cosine);
+    }
+    /* Cosines near 1 lose digits: t is known to some 1e-8. */
+    const double r = exists ? most * (1 + 1e-7) : NEVER_HIDDEN;
+    for (int k = 0; k < 3; k++) globe->horizon[k] = direction[k] * r;
+}
+
+int globe_make(const tile_mesh *mesh, tile_globe *globe) {
+    const size_t count = mesh->cut.vertex_count;
+    *globe = (tile_globe){.xyz = sqlite3_malloc64((3 * count + 1) * sizeof *globe->xyz)};
+    if (!globe->xyz) return SQLITE_NOMEM;
+    place_all(mesh, globe->xyz);
+    find_sphere(globe->xyz, count, globe);
+    find_horizon(globe->xyz, count, globe);
+    return SQLITE_OK;
+}
+
+void globe_free(tile_globe *globe) {
+    sqlite3_free(globe->xyz);
+    *globe = (tile_globe){0};
+}
+
+/* ------------------------------------------------------------------------------------------------ normals -- */
+
+/* The samples around a place and how much each counts; 1 where the place is one. */
+typedef struct around {
+    uint8_t count;
+    float weight[4];
+} around;
+
+static around list_samples(const rqt_cut_vertex *v, rqt_patch *samples) {
+    around a = {0};
+    const double col = floor(v->col), row = floor(v->row), right = v->col - col, down = v->row - row;
+    for (int i = 0; i < 4; i++) {
+        const double weight = (i & 1 ? right : 1 - right) * (i & 2 ? down : 1 - down);
+        if (weight <= 0) continue;
+        samples->vertices[samples->vertex_count++] =
+            (rqt_patch_vertex){.col = (int32_t)col + (i & 1), .row = (int32_t)row + (i >> 1)};
+        a.weight[a.count++] = (float)weight;
+    }
+    return a;
+}
+
+static uint8_t to_byte(double x) {
+    return (uint8_t)floor((x < -1 ? 0 : x > 1 ? 1 : x * 0.5 + 0.5) * 255 + 0.5);
+}
+
+/* "A Survey of Efficient Representations for Independent Unit Vectors" (Cigolle and others, 2014): oct, 16 bits. */
+static void pack(const double n[3], uint8_t packed[2]) {
+    const double sum = fabs(n[0]) + fabs(n[1]) + fabs(n[2]);
+    double x = n[0] / sum, y = n[1] / sum;
+    if (n[2] < 0) {
+        const double folded = (1 - fabs(y)) * (x < 0 ? -1 : 1);
+        y = (1 - fabs(x)) * (y < 0 ? -1 : 1);
+        x = folded;
+    }
+    packed[0] = to_byte(x);
+    packed[1] = to_byte(y);
+}
+
+/* From east, north, up at a place. */
+static void turn(const double lonlat[2], const double enu[3], double out[3]) {
+    const double sl = sin(lonlat[0] * DEGREE), cl = cos(lonlat[0] * DEGREE), sp = sin(lonlat[1] * DEGREE),
+                 cp = cos(lonlat[1] * DEGREE);
+    out[0] = -sl * enu[0] - sp * cl * enu[1] + cp * cl * enu[2];
+    out[1] = cl * enu[0] - sp * sl * enu[1] + cp * sl * enu[2];
+    out[2] = cp * enu[1] + sp * enu[2];
+}
+
+int globe_normals(tiles *t, const tile_mesh *mesh, uint8_t *packed, char **error) {
+    const size_t count = mesh->cut.vertex_count;
+    rqt_patch samples = {.vertices = sqlite3_malloc64((4 * count + 1) * sizeof *samples.vertices)};
+    around *all = sqlite3_malloc64((count + 1) * sizeof *all);
+    float *normals = NULL;
+    int code = samples.vertices && all ? SQLITE_OK : SQLITE_NOMEM;
+    if (code == SQLITE_OK) {
+        for (size_t i = 0; i < count; i++) all[i] = list_samples(&mesh->cut.vertices[i], &samples);
+        code = store_normals(t->store, t->terrain, &samples, &normals, error);
+    }
+    const float *next = normals;
+    for (size_t i = 0; i < count && code == SQLITE_OK; i++) {
+        double enu[3] = {0}, n[3];
+        for (int k = 0; k < all[i].count; k++, next += 3)
+            for (int c = 0; c < 3; c++) enu[c] += (double)all[i].weight[k] * (double)next[c];
+        turn(mesh->lonlath + 3 * i, enu, n);
+        pack(n, packed + 2 * i);
+    }
+    sqlite3_free(normals);
+    sqlite3_free(all);
+    sqlite3_free(samples.vertices);
+    return code;
+}

@@ -1,0 +1,119 @@
+/* internal.h - the parts of the tiles.
+ *
+ *   tiles.c    a connection's tiles: the plan of its terrain, kept while nothing changes
+ *   plan.c     levels and their tolerances, heights, where tiles lie on the raster
+ *   mesh.c     the terrain's mesh, cut to a tile and quantised; what it is off
+ *   globe.c    places in space: bounding sphere, horizon, normals
+ *   water.c    the water mask
+ *   encode.c   bytes
+ *   layer.c    which tiles there are; layer.json
+ *   pyramid.c  to disk
+ */
+#ifndef RQT_TILES_INTERNAL_H
+#define RQT_TILES_INTERNAL_H
+
+#include "geo.h"
+#include "tiles.h"
+
+enum { TILE_UNITS = 32767 }; /* a tile's side, and the range of heights, in what is stored */
+
+typedef struct tile_level {
+    double geometric_error; /* what clients take the level to be off, metres */
+    double eps;             /* of the mesh, in space, before it is quantised */
+} tile_level;
+
+typedef struct sea_run {
+    int32_t row, first, last;
+} sea_run;
+
+/* What all tiles of a terrain have in common. */
+typedef struct tile_plan {
+    char name[64];
+    uint64_t state; /* store_state when it was made; 0: not to be kept */
+    int finest;
+    tile_level level[TILES_LEVELS];
+    double lowest, step; /* a height n is lowest + n * step metres, 0 <= n <= TILE_UNITS; step a power of two */
+    double radius;       /* no radius of curvature, and height above it, is larger: metres */
+    double rounded;      /* the terrain's quantum_error */
+    rqt_rule *rule;      /* its lowering is what curvature takes */
+    geo_frame *geoid;    /* NULL: heights are the ellipsoid's */
+    geo_geoid undulation;
+    bool has_sea;
+    sea_run *sea;
+    size_t sea_count;
+    tile_range *ranges[TILES_LEVELS]; /* NULL: not yet asked for */
+    size_t range_count[TILES_LEVELS];
+} tile_plan;
+
+enum { KEPT_PLANS = 8 };
+struct tiles {
+    sqlite3 *db;
+    store *store;
+    const store_terrain *terrain; /* between begin and end */
+    tile_plan *plan;              /* of the terrain, likewise */
+    tile_plan *kept[KEPT_PLANS];
+    int next; /* place of the plan that goes next */
+};
+
+/* A sentence into *error; returns SQLITE_ERROR, or SQLITE_NOMEM. plan.c */
+int tiles_fail(char **error, const char *format, ...) __attribute__((format(printf, 2, 3)));
+int tiles_fail_database(char **error, sqlite3 *db, int code);
+
+int plan_create(tiles *t, uint64_t state, tile_plan **out, char **error);
+void plan_free(tile_plan *plan);
+
+/* A tile on the raster: in samples, not rounded, for each time that it meets the raster (longitudes are the same
+ * modulo 360). */
+typedef struct tile_turn {
+    double west, east, north, south; /* samples */
+    int64_t box[4];                  /* the same in 2^-20 samples, as regions have it: west, east, north, south */
+} tile_turn;
+enum { MOST_TURNS = 4 };
+typedef struct tile_place {
+    int z;
+    int32_t x, y;
+    double west, south, side; /* degrees */
+    tile_turn turn[MOST_TURNS];
+    int turns; /* 0: the tile misses the raster */
+} tile_place;
+/* False: there is no such tile, whatever the terrain. */
+bool plan_place(const tiles *t, int z, int32_t x, int32_t y, tile_place *place);
+/* The tiles of a level that meet the raster, as ranges that do not meet each other, at most MOST_TURNS. */
+int plan_ranges(const tiles *t, int z, tile_range ranges[MOST_TURNS]);
+/* The place's rectangle as a region. */
+int plan_region(const tiles *t, const tile_place *place, rqt_region **region);
+/* Sets the rule; the options of every query of this level. */
+int plan_options(const tiles *t, int z, store_query_options *options);
+
+typedef struct tile_mesh {
+    rqt_cut cut;         /* vertices in samples */
+    uint16_t *u, *v, *h; /* of each vertex */
+    double *lonlath;     /* what a client reads of them: degrees and metres above the ellipsoid */
+    uint32_t *edge[4];   /* vertices on the tile's west, south, east, north side, from south or west on */
+    uint32_t edge_count[4];
+    double move[3];        /* the most that a vertex was moved: degrees, degrees, metres */
+    double error;          /* no sample is further from the mesh in space: metres */
+    double vertical_error; /* ... above or below it in longitude, latitude, height, where the outline is not near */
+} tile_mesh;
+/* Without a triangle, when the tile has none. */
+int mesh_make(tiles *t, const tile_place *place, tile_mesh *mesh, char **error);
+void mesh_free(tile_mesh *mesh);
+
+typedef struct tile_globe {
+    double *xyz; /* geocentric, of each vertex */
+    double centre[3], radius;
+    double horizon[3];
+} tile_globe;
+int globe_make(const tile_mesh *mesh, tile_globe *globe);
+void globe_free(tile_globe *globe);
+/* Two bytes a vertex: oct-encoded normals of the terrain, geocentric. */
+int globe_normals(tiles *t, const tile_mesh *mesh, uint8_t *packed, char **error);
+
+enum { WATER_SIDE = 256 };
+int water_read(tiles *t, tile_plan *plan, char **error);
+/* Pixels from the north-west on; how many of them there are: 1 where all are the same. */
+size_t water_mask(const tiles *t, const tile_place *place, uint8_t mask[WATER_SIDE * WATER_SIDE]);
+
+int encode_tile(tiles *t, const tile_place *place, const tile_mesh *mesh, tile_bytes *out, char **error);
+
+#endif

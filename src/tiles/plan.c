@@ -1,0 +1,307 @@
+/* plan.c - what all tiles of a terrain have in common: levels and their tolerances, the steps of heights, and where
+ * a tile lies on the raster.
+ *
+ * Levels. Clients do not ask how far a tile is off: they take level z to be off by
+ *
+ *     G(z) = 2 pi a / 4 / (65 * 2 * 2^z) = 77067 m / 2^z
+ *
+ * (a = 6378137 m; what a grid of 65 x 65 heights is reckoned to be off, with two tiles at level 0), and draw a tile
+ * as long as that is no more than a pixel or two. So eps(z) = G(z) - move(z), where move(z) is the most that
+ * quantisation moves a vertex (mesh.c): then what is promised is true at every level, whatever the terrain. The
+ * last level, the first whose tiles are no more than 64 samples a side, is as fine as clients get to see: its eps
+ * is half a quantum of the terrain's heights where that is less, and the mesh is the terrain.
+ *
+ * One eps at a level, one rule, one mesh: tiles are parts of it. The rule is lowered by what the Earth's curvature
+ * takes from flat triangles (geo_frame_sag), as option frame does, for clients draw chords in space.
+ *
+ * Heights. All tiles of all levels have the same lowest height and the same step, a power of two: the least for
+ * which TILE_UNITS steps hold the terrain. So a height that two tiles share is the same number in both, and
+ * whatever decodes it gets the same double twice. Both ends of the range fit a float, as they are stored: they are
+ * less than 2^24 steps.
+ *
+ * Where a tile lies. Its sides are at longitudes and latitudes that are doubles exactly; in samples they are
+ * rounded, and once more to 2^-20 sample, as regions are: functions of the side alone, so that neighbours have it
+ * in common.
+ */
+#include "internal.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#define DEGREE 0.017453292519943295
+#define EQUATOR 6378137.0
+#define CURVED 6399593.7    /* the largest radius of curvature of WGS 84: at the poles */
+#define GEOID_HIGHEST 120.0 /* EGM96 lies between -107 and 86 */
+#define ROOT_ERROR (EQUATOR * 2 * M_PI * 0.25 / (65 * 2))
+enum { LARGEST_TILE = 64, FIRST_STEP = -10, UNIT_BITS = 20 };
+#define FARTHEST ((int64_t)1 << 60) /* units: as regions have it */
+
+int tiles_fail(char **error, const char *format, ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    char *text = sqlite3_vmprintf(format, arguments);
+    va_end(arguments);
+    sqlite3_free(*error);
+    *error = text;
+    return text ? SQLITE_ERROR : SQLITE_NOMEM;
+}
+
+int tiles_fail_database(char **error, sqlite3 *db, int code) {
+    const int failed = tiles_fail(error, "%s", sqlite3_errmsg(db));
+    return failed == SQLITE_NOMEM ? failed : code;
+}
+
+/* ------------------------------------------------------------------------------------------------- levels -- */
+
+static int check_terrain(const store_terrain *t, bool *is_above_geoid, char **error) {
+    *is_above_geoid = sqlite3_strlike("%EGM96%", t->vertical, 0) == 0;
+    if (!t->lonlat || !t->wgs84 || t->placement.dx <= 0 || t->placement.dy >= 0)
+        return tiles_fail(
+            error, "terrain %s has no tiles: they are of terrains in longitude and latitude on WGS 84", t->name);
+    if (!*is_above_geoid && t->vertical[0] && sqlite3_strlike("%ellipsoid%", t->vertical, 0))
+        return tiles_fail(error,
+                          "terrain %s has no tiles: its heights are \"%s\", and only those above the ellipsoid and "
+                          "above EGM96 can be placed in space",
+                          t->name, t->vertical);
+    return SQLITE_OK;
+}
+
+static geo_extent extent_of(const store_terrain *t) {
+    const rqt_placement *at = &t->placement;
+    const double low = rqt_unit_metres(&t->unit, t->min_q), high = rqt_unit_metres(&t->unit, t->max_q);
+    return (geo_extent){.west = at->x0,
+                        .east = at->x0 + (t->lattice.width - 1) * at->dx,
+                        .south = at->y0 + (t->lattice.height - 1) * at->dy,
+                        .north = at->y0,
+                        .lon_step = at->dx,
+                        .lat_step = -at->dy,
+                        .lowest = fmin(low, high),
+                        .highest = fmax(low, high)};
+}
+
+/* The rule, lowered; what is known of the geoid. */
+static int make_rule(const store_terrain *t, tile_plan *plan, bool is_above_geoid, char **error) {
+    char why[256] = "";
+    const geo_ellipsoid wgs84 = GEO_WGS84;
+    const geo_extent extent = extent_of(t);
+    double lowering[RQT_RANKS];
+    geo_frame *frame = NULL;
+    const int made = geo_frame_create(GEO_ECEF, &wgs84, 0, 0, is_above_geoid, &frame, why, sizeof why);
+    if (made != GEO_OK)
+        return made == GEO_NO_MEMORY ? SQLITE_NOMEM
+                                     : tiles_fail(error, "terrain %s has no tiles: %s", t->name, why);
+    geo_frame_sag(frame, &extent, RQT_RANKS, lowering);
+    plan->undulation = geo_frame_geoid(frame, &extent);
+    if (is_above_geoid)
+        plan->geoid = frame;
+    else
+        geo_frame_free(frame);
+    rqt_status status = rqt_rule_create(&t->lattice, t->quantum_error, store_allocator(), &plan->rule);
+    if (status == RQT_OK) status = rqt_rule_set_lowering(plan->rule, lowering);
+    return status == RQT_OK          ? SQLITE_OK
+           : status == RQT_NO_MEMORY ? SQLITE_NOMEM
+                                     : tiles_fail(error, "terrain %s is too large for tiles", t->name);
+}
+
+static void set_heights(const store_terrain *t, tile_plan *plan) {
+    const geo_extent extent = extent_of(t);
+    const double low = extent.lowest - plan->undulation.most, high = extent.highest + plan->undulation.most;
+    plan->step = ldexp(1, FIRST_STEP);
+    for (;; plan->step *= 2) {
+        plan->lowest = floor(low / plan->step) * plan->step;
+        if ((high - plan->lowest) / plan->step > TILE_UNITS) continue;
+        if (fabs(plan->lowest) / plan->step + TILE_UNITS < 1 << 24) break;
+    }
+    plan->radius = CURVED + fmax(fabs(low), fabs(high)) + (plan->geoid ? GEOID_HIGHEST : 0);
+}
+
+static void set_levels(const store_terrain *t, tile_plan *plan) {
+    const double sample = fmin(t->placement.dx, -t->placement.dy);
+    const double quantum = fabs(rqt_unit_factor(&t->unit)) / t->unit.d;
+    for (int z = 0; z < TILES_LEVELS; z++) {
+        tile_level *level = &plan->level[z];
+        const double side = ldexp(180, -z), unit = side * DEGREE / TILE_UNITS * plan->radius;
+        const double move = hypot(M_SQRT2 * unit, plan->step / 2);
+        level->geometric_error = ldexp(ROOT_ERROR, -z);
+        if (z > 0 && move > level->geometric_error / 2) break; /* finer than heights are told */
+        plan->finest = z;
+        level->eps = level->geometric_error - move;
+        if (side > LARGEST_TILE * sample) continue;
+        level->eps = fmin(level->eps, quantum / 2);
+        break;
+    }
+}
+
+int plan_create(tiles *t, uint64_t state, tile_plan **out, char **error) {
+    const store_terrain *terrain = t->terrain;
+    bool is_above_geoid;
+    int code = check_terrain(terrain, &is_above_geoid, error);
+    if (code != SQLITE_OK) return code;
+    tile_plan *plan = sqlite3_malloc(sizeof *plan);
+    if (!plan) return SQLITE_NOMEM;
+    *plan = (tile_plan){.state = state, .rounded = terrain->quantum_error};
+    snprintf(plan->name, sizeof plan->name, "%s", terrain->name);
+    code = make_rule(terrain, plan, is_above_geoid, error);
+    if (code == SQLITE_OK) {
+        set_heights(terrain, plan);
+        set_levels(terrain, plan);
+        code = water_read(t, plan, error);
+    }
+    if (code != SQLITE_OK)
+        plan_free(plan);
+    else
+        *out = plan;
+    return code;
+}
+
+void plan_free(tile_plan *plan) {
+    if (!plan) return;
+    rqt_rule_free(plan->rule);
+    geo_frame_free(plan->geoid);
+    sqlite3_free(plan->sea);
+    for (int z = 0; z < TILES_LEVELS; z++) sqlite3_free(plan->ranges[z]);
+    sqlite3_free(plan);
+}
+
+int plan_options(const tiles *t, int z, store_query_options *options) {
+    *options = (store_query_options){.select = RQT_SELECT_THRESHOLD,
+                                     .outline = RQT_OUTLINE_TOL,
+                                     .metric = RQT_METRIC_EXACT,
+                                     .product = RQT_PRODUCT_TRIANGLES,
+                                     .rule = t->plan->rule};
+    return rqt_rule_set_eps(t->plan->rule, t->plan->level[z].eps) == RQT_OK ? SQLITE_OK : SQLITE_NOMEM;
+}
+
+/* ------------------------------------------------------------------------------------------------- places -- */
+
+static double samples(double coordinate, double origin, double step) {
+    return (coordinate - origin) / step;
+}
+
+/* As regions round. */
+static int64_t units(double of_samples) {
+    const double n = ldexp(of_samples, UNIT_BITS);
+    return n >= (double)FARTHEST ? FARTHEST : n <= -(double)FARTHEST ? -FARTHEST : (int64_t)rint(n);
+}
+
+static bool overlaps(int64_t from, int64_t to, int32_t count) {
+    const int64_t last = (int64_t)(count - 1) << UNIT_BITS;
+    return (from > 0 ? from : 0) < (to < last ? to : last);
+}
+
+static void place_columns(const tiles *t, double side, int32_t x, int turn, tile_turn *out) {
+    const rqt_placement *at = &t->terrain->placement;
+    out->west = samples(-180 + x * side + 360.0 * turn, at->x0, at->dx);
+    out->east = samples(-180 + (x + 1.0) * side + 360.0 * turn, at->x0, at->dx);
+    out->box[0] = units(out->west);
+    out->box[1] = units(out->east);
+}
+
+static void place_rows(const tiles *t, double side, int32_t y, tile_turn *out) {
+    const rqt_placement *at = &t->terrain->placement;
+    out->south = samples(-90 + y * side, at->y0, at->dy);
+    out->north = samples(-90 + (y + 1.0) * side, at->y0, at->dy);
+    out->box[2] = units(out->north);
+    out->box[3] = units(out->south);
+}
+
+/* The turns on which the globe's 360 degrees may meet the raster. */
+static void find_turns(const tiles *t, int *first, int *last) {
+    const geo_extent e = extent_of(t->terrain);
+    *first = (int)floor((e.west - 180) / 360);
+    *last = (int)ceil((e.east + 180) / 360);
+}
+
+bool plan_place(const tiles *t, int z, int32_t x, int32_t y, tile_place *place) {
+    if (z < 0 || z > t->plan->finest || x < 0 || y < 0 || x >= 2 << z || y >= 1 << z) return false;
+    const double side = ldexp(180, -z);
+    int first, last;
+    *place = (tile_place){.z = z, .x = x, .y = y, .west = -180 + x * side, .south = -90 + y * side, .side = side};
+    find_turns(t, &first, &last);
+    for (int turn = first; turn <= last && place->turns < MOST_TURNS; turn++) {
+        tile_turn *new = &place->turn[place->turns];
+        place_columns(t, side, x, turn, new);
+        place_rows(t, side, y, new);
+        place->turns += overlaps(new->box[0], new->box[1], t->terrain->lattice.width) &&
+                        overlaps(new->box[2], new->box[3], t->terrain->lattice.height);
+    }
+    return true;
+}
+
+static int32_t clamp_tile(double n, int32_t count) {
+    return n < 0 ? 0 : n > count - 1 ? count - 1 : (int32_t)n;
+}
+
+/* The columns of tiles that meet the raster on a turn; false: none. */
+static bool range_of_columns(const tiles *t, double side, int turn, int32_t count, tile_range *range) {
+    const geo_extent e = extent_of(t->terrain);
+    const int32_t width = t->terrain->lattice.width;
+    tile_turn at;
+    range->x0 = clamp_tile(floor((e.west - 360.0 * turn + 180) / side) - 1, count);
+    range->x1 = clamp_tile(floor((e.east - 360.0 * turn + 180) / side) + 1, count);
+    for (; range->x0 <= range->x1; range->x0++) {
+        place_columns(t, side, range->x0, turn, &at);
+        if (overlaps(at.box[0], at.box[1], width)) break;
+    }
+    for (; range->x1 >= range->x0; range->x1--) {
+        place_columns(t, side, range->x1, turn, &at);
+        if (overlaps(at.box[0], at.box[1], width)) break;
+    }
+    return range->x0 <= range->x1;
+}
+
+static bool range_of_rows(const tiles *t, double side, int32_t count, tile_range *range) {
+    const geo_extent e = extent_of(t->terrain);
+    const int32_t height = t->terrain->lattice.height;
+    tile_turn at;
+    range->y0 = clamp_tile(floor((e.south + 90) / side) - 1, count);
+    range->y1 = clamp_tile(floor((e.north + 90) / side) + 1, count);
+    for (; range->y0 <= range->y1; range->y0++) {
+        place_rows(t, side, range->y0, &at);
+        if (overlaps(at.box[2], at.box[3], height)) break;
+    }
+    for (; range->y1 >= range->y0; range->y1--) {
+        place_rows(t, side, range->y1, &at);
+        if (overlaps(at.box[2], at.box[3], height)) break;
+    }
+    return range->y0 <= range->y1;
+}
+
+int plan_ranges(const tiles *t, int z, tile_range ranges[MOST_TURNS]) {
+    const double side = ldexp(180, -z);
+    int first, last, count = 0;
+    tile_range next;
+    if (!range_of_rows(t, side, 1 << z, &next)) return 0;
+    find_turns(t, &first, &last);
+    /* A later turn lies further west on the globe. */
+    for (int turn = last; turn >= first && count < MOST_TURNS; turn--) {
+        if (!range_of_columns(t, side, turn, 2 << z, &next)) continue;
+        if (count > 0 && next.x0 <= ranges[count - 1].x1 + 1) {
+            if (next.x1 > ranges[count - 1].x1) ranges[count - 1].x1 = next.x1;
+            continue;
+        }
+        ranges[count++] = next;
+    }
+    return count;
+}
+
+int plan_region(const tiles *t, const tile_place *place, rqt_region **region) {
+    const rqt_placement as_it_is = {0, 0, 1, 1};
+    char text[MOST_TURNS * 256] = "MULTIPOLYGON(", *end = text + strlen(text);
+    rqt_geometry *geometry = NULL;
+    rqt_message why;
+    for (int i = 0; i < place->turns; i++) {
+        double box[4];
+        for (int k = 0; k < 4; k++) box[k] = ldexp((double)place->turn[i].box[k], -UNIT_BITS);
+        end += sprintf(end, "%s((%.17g %.17g,%.17g %.17g,%.17g %.17g,%.17g %.17g,%.17g %.17g))", i ? "," : "",
+                       box[0], box[2], box[1], box[2], box[1], box[3], box[0], box[3], box[0], box[2]);
+    }
+    strcpy(end, ")");
+    rqt_status status = rqt_geometry_parse(text, strlen(text), true, store_allocator(), &geometry, &why);
+    if (status == RQT_OK)
+        status = rqt_region_create(geometry, &as_it_is, &t->terrain->lattice, store_allocator(), region);
+    rqt_geometry_free(geometry);
+    return status == RQT_OK ? SQLITE_OK : SQLITE_NOMEM;
+}

@@ -1,0 +1,332 @@
+/* pyramid.c - all tiles of a terrain as files: FOLDER/z/x/y.terrain, and FOLDER/layer.json when all are there.
+ *
+ * Workers take pieces of rows, each with a connection of its own; a tile's bytes depend on nothing but the terrain,
+ * so it does not matter which makes it. Each file is written beside its place and renamed: it is there whole or not
+ * at all, and what is there need not be made again. FOLDER/.rqt-tiles says of what the tiles are: terrain, state of
+ * the database, options. A folder that says something else is another's, and is refused; while somebody works in it
+ * the file is locked. layer.json comes last, so a folder that has it is complete.
+ */
+#include "internal.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <zlib.h>
+
+enum { PIECE = 32, MOST_PATH = 4096, GZIP_LEVEL = 5, GZIP_WINDOW = 15 + 16, GZIP_MEMORY = 8 };
+
+/* Tiles x0..x1 of one row. */
+typedef struct piece {
+    int z;
+    int32_t y, x0, x1;
+} piece;
+
+typedef struct pyramid {
+    const tiles_job *job;
+    char *description; /* of what the tiles are */
+    int last;
+    piece *pieces;
+    size_t count;
+    atomic_size_t next;
+    atomic_llong done, written, bytes;
+    atomic_bool stop;
+    pthread_mutex_t lock; /* of what follows */
+    pthread_cond_t ended;
+    int working;
+    int code;
+    char *error;
+} pyramid;
+
+/* ---------------------------------------------------------------------------------------------------- files -- */
+
+static int fail_file(char **error, const char *path) {
+    return tiles_fail(error, "%s: %s", path, strerror(errno));
+}
+
+static int make_folder(const char *path, char **error) {
+    return mkdir(path, 0777) == 0 || errno == EEXIST ? SQLITE_OK : fail_file(error, path);
+}
+
+/* Whole or not at all. */
+static int write_file(const char *path, const void *bytes, size_t size, char **error) {
+    char part[MOST_PATH + 8];
+    snprintf(part, sizeof part, "%s.part", path);
+    FILE *f = fopen(part, "wb");
+    if (!f) return fail_file(error, part);
+    const bool ok = fwrite(bytes, 1, size, f) == size && fflush(f) == 0;
+    if (fclose(f) == 0 && ok && rename(part, path) == 0) return SQLITE_OK;
+    (void)fail_file(error, path);
+    unlink(part);
+    return SQLITE_IOERR;
+}
+
+/* The same bytes for the same bytes: no name and no time in it. */
+static int pack(tile_bytes *b) {
+    z_stream z = {0};
+    if (b->size > INT32_MAX ||
+        deflateInit2(&z, GZIP_LEVEL, Z_DEFLATED, GZIP_WINDOW, GZIP_MEMORY, Z_DEFAULT_STRATEGY) != Z_OK)
+        return SQLITE_NOMEM;
+    const uLong bound = deflateBound(&z, (uLong)b->size);
+    uint8_t *packed = sqlite3_malloc64(bound);
+    z.next_in = b->bytes;
+    z.avail_in = (uInt)b->size;
+    z.next_out = packed;
+    z.avail_out = (uInt)bound;
+    const bool ok = packed && deflate(&z, Z_FINISH) == Z_STREAM_END;
+    const size_t size = z.total_out;
+    deflateEnd(&z);
+    if (!ok) {
+        sqlite3_free(packed);
+        return SQLITE_NOMEM;
+    }
+    sqlite3_free(b->bytes);
+    *b = (tile_bytes){packed, size};
+    return SQLITE_OK;
+}
+
+/* ---------------------------------------------------------------------------------------------- description -- */
+
+/* What the tiles are of. A database is taken for another one when its file is: bytes, time. */
+static char *describe_job(const tiles_job *job, const tiles *t, int last) {
+    struct stat file = {0}, log = {0};
+    char path[MOST_PATH];
+    snprintf(path, sizeof path, "%s-wal", job->database);
+    if (stat(job->database, &file) || stat(path, &log)) log = (struct stat){0};
+    return sqlite3_mprintf(
+        "rqt %s\nterrain %s of %s\ndatabase %lld bytes, %lld.%09ld s, log %lld bytes, %lld.%09ld s\n"
+        "levels %d to %d%s\n",
+        RQT_VERSION, t->terrain->name, t->terrain->created, (long long)file.st_size, (long long)file.st_mtim.tv_sec,
+        (long)file.st_mtim.tv_nsec, (long long)log.st_size, (long long)log.st_mtim.tv_sec,
+        (long)log.st_mtim.tv_nsec, job->first, last, job->gzip ? ", gzip" : "");
+}
+
+/* Does a connection that has begun to read see what the tiles are of? Asked after it has begun: a commit in between
+ * changes the file. */
+static int check_state(const pyramid *p, const tiles *t, char **error) {
+    char *now = describe_job(p->job, t, p->last);
+    const int code = !now                               ? SQLITE_NOMEM
+                     : strcmp(now, p->description) == 0 ? SQLITE_OK
+                                                        : tiles_fail(error, "the database has changed meanwhile");
+    sqlite3_free(now);
+    return code;
+}
+
+/* -------------------------------------------------------------------------------------------------- workers -- */
+
+static int write_tile(pyramid *p, tiles *t, const piece *row, int32_t x, char **error) {
+    char path[MOST_PATH];
+    struct stat there;
+    tile_bytes tile;
+    snprintf(path, sizeof path, "%s/%d/%d/%d.terrain", p->job->folder, row->z, (int)x, (int)row->y);
+    if (stat(path, &there) == 0) return SQLITE_OK;
+    int code = tiles_make(t, row->z, x, row->y, &tile, error);
+    if (code == SQLITE_OK && tile.size > 0) {
+        if (p->job->gzip) code = pack(&tile);
+        if (code == SQLITE_OK) code = write_file(path, tile.bytes, tile.size, error);
+        if (code == SQLITE_OK) {
+            p->written++;
+            p->bytes += (long long)tile.size;
+        }
+    }
+    sqlite3_free(tile.bytes);
+    return code;
+}
+
+static int write_pieces(pyramid *p, tiles *t, char **error) {
+    int code = tiles_begin(t, p->job->terrain, error);
+    if (code != SQLITE_OK) return code;
+    code = check_state(p, t, error);
+    for (size_t n; code == SQLITE_OK && (n = p->next++) < p->count;)
+        for (int32_t x = p->pieces[n].x0; x <= p->pieces[n].x1 && code == SQLITE_OK && !p->stop; x++) {
+            code = write_tile(p, t, &p->pieces[n], x, error);
+            p->done++;
+        }
+    tiles_end(t);
+    return code;
+}
+
+static void *work(void *argument) {
+    pyramid *p = argument;
+    char *error = NULL;
+    tiles *t = NULL;
+    pthread_mutex_lock(&p->lock); /* connections are opened one at a time: they may speak */
+    sqlite3 *db = p->stop ? NULL : p->job->connect(p->job->context);
+    pthread_mutex_unlock(&p->lock);
+    int code = db ? tiles_open(db, &t) : SQLITE_CANTOPEN;
+    if (code == SQLITE_OK) code = write_pieces(p, t, &error);
+    tiles_close(t);
+    sqlite3_close(db);
+    pthread_mutex_lock(&p->lock);
+    if (code != SQLITE_OK) {
+        p->stop = true;
+        if (p->code == SQLITE_OK) {
+            p->code = code;
+            p->error = error;
+            error = NULL;
+        }
+    }
+    p->working--;
+    pthread_cond_signal(&p->ended);
+    pthread_mutex_unlock(&p->lock);
+    sqlite3_free(error);
+    return NULL;
+}
+
+/* Waits for the workers, and tells how far they are. */
+static void watch(pyramid *p, int64_t all) {
+    pthread_mutex_lock(&p->lock);
+    while (p->working > 0) {
+        struct timespec until;
+        clock_gettime(CLOCK_REALTIME, &until);
+        until.tv_nsec += 100000000;
+        if (until.tv_nsec >= 1000000000) until.tv_sec++, until.tv_nsec -= 1000000000;
+        pthread_cond_timedwait(&p->ended, &p->lock, &until);
+        if (p->stop || !p->job->progress || p->job->progress(p->job->context, p->done, all)) continue;
+        p->stop = true;
+        if (p->code == SQLITE_OK) p->code = SQLITE_INTERRUPT;
+    }
+    pthread_mutex_unlock(&p->lock);
+}
+
+static int run_workers(pyramid *p, int64_t all, char **error) {
+    pthread_t threads[64];
+    int begun = 0;
+    const int wanted = p->job->workers < 1 ? 1 : p->job->workers > 64 ? 64 : p->job->workers;
+    pthread_mutex_init(&p->lock, NULL);
+    pthread_cond_init(&p->ended, NULL);
+    p->working = wanted;
+    while (begun < wanted && pthread_create(&threads[begun], NULL, work, p) == 0) begun++;
+    pthread_mutex_lock(&p->lock);
+    p->working -= wanted - begun;
+    if (begun == 0) p->code = SQLITE_NOMEM;
+    pthread_mutex_unlock(&p->lock);
+    watch(p, all);
+    for (int i = 0; i < begun; i++) pthread_join(threads[i], NULL);
+    pthread_cond_destroy(&p->ended);
+    pthread_mutex_destroy(&p->lock);
+    *error = p->error;
+    return p->code;
+}
+
+/* ----------------------------------------------------------------------------------------------------- whole -- */
+
+static int add_pieces(pyramid *p, int z, const tile_range *r, size_t *capacity, int64_t *all) {
+    for (int32_t y = r->y0; y <= r->y1; y++)
+        for (int32_t x = r->x0; x <= r->x1; x += PIECE) {
+            if (p->count == *capacity) {
+                *capacity = *capacity ? 2 * *capacity : 256;
+                piece *more = sqlite3_realloc64(p->pieces, *capacity * sizeof *more);
+                if (!more) return SQLITE_NOMEM;
+                p->pieces = more;
+            }
+            const int32_t last = x + PIECE - 1 < r->x1 ? x + PIECE - 1 : r->x1;
+            p->pieces[p->count++] = (piece){z, y, x, last};
+            *all += last - x + 1;
+        }
+    return SQLITE_OK;
+}
+
+static int make_folders(const tiles_job *job, int z, const tile_range *r, char **error) {
+    char path[MOST_PATH];
+    snprintf(path, sizeof path, "%s/%d", job->folder, z);
+    int code = make_folder(path, error);
+    for (int32_t x = r->x0; x <= r->x1 && code == SQLITE_OK; x++) {
+        snprintf(path, sizeof path, "%s/%d/%d", job->folder, z, (int)x);
+        code = make_folder(path, error);
+    }
+    return code;
+}
+
+static int list_pieces(pyramid *p, tiles *t, int last, int64_t *all, char **error) {
+    size_t capacity = 0;
+    int code = SQLITE_OK;
+    for (int z = p->job->first; z <= last && code == SQLITE_OK; z++) {
+        const tile_range *ranges;
+        size_t count;
+        code = tiles_available(t, z, &ranges, &count, error);
+        for (size_t i = 0; i < count && code == SQLITE_OK; i++) {
+            code = make_folders(p->job, z, &ranges[i], error);
+            if (code == SQLITE_OK) code = add_pieces(p, z, &ranges[i], &capacity, all);
+        }
+    }
+    return code;
+}
+
+/* Makes the folder ours: *file holds its lock. */
+static int claim_folder(const tiles_job *job, const char *description, int *file, char **error) {
+    char path[MOST_PATH], there[1024] = "";
+    int code = make_folder(job->folder, error);
+    if (code != SQLITE_OK) return code;
+    snprintf(path, sizeof path, "%s/.rqt-tiles", job->folder);
+    *file = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+    if (*file < 0) return fail_file(error, path);
+    if (flock(*file, LOCK_EX | LOCK_NB))
+        return tiles_fail(error, "%s: another rqt tiles is at work there", job->folder);
+    const size_t size = strlen(description);
+    const ssize_t n = read(*file, there, sizeof there);
+    if (n < 0) return fail_file(error, path);
+    if (n == 0) return write(*file, description, size) == (ssize_t)size ? SQLITE_OK : fail_file(error, path);
+    if ((size_t)n < size && memcmp(there, description, (size_t)n) == 0) /* killed at this very place */
+        return pwrite(*file, description, size, 0) == (ssize_t)size ? SQLITE_OK : fail_file(error, path);
+    if ((size_t)n == size && memcmp(there, description, size) == 0) return SQLITE_OK;
+    return tiles_fail(
+        error,
+        "%s holds tiles of another terrain, of another state of the database or of other options: give "
+        "another folder, or remove it",
+        job->folder);
+}
+
+static int write_layer(tiles *t, const tiles_job *job, int last, char **error) {
+    char path[MOST_PATH];
+    tile_bytes layer;
+    snprintf(path, sizeof path, "%s/layer.json", job->folder);
+    int code = tiles_layer(t, job->first, last, &layer, error);
+    if (code == SQLITE_OK) code = write_file(path, layer.bytes, layer.size, error);
+    sqlite3_free(layer.bytes);
+    return code;
+}
+
+static int write_all(pyramid *p, tiles *t, tiles_report *report, char **error) {
+    const tiles_job *job = p->job;
+    int file = -1;
+    p->last = job->last < t->plan->finest ? job->last : t->plan->finest;
+    if (strlen(job->folder) > MOST_PATH - 64) return tiles_fail(error, "the folder's name is too long");
+    if (job->first > p->last)
+        return tiles_fail(error, "terrain %s has levels 0 to %d", t->terrain->name, t->plan->finest);
+    p->description = describe_job(job, t, p->last);
+    int code = p->description ? claim_folder(job, p->description, &file, error) : SQLITE_NOMEM;
+    if (code == SQLITE_OK) code = list_pieces(p, t, p->last, &report->tiles, error);
+    if (code == SQLITE_OK) code = run_workers(p, report->tiles, error);
+    if (code == SQLITE_OK) code = write_layer(t, job, p->last, error);
+    report->written = p->written;
+    report->bytes = p->bytes;
+    report->finest = p->last;
+    if (file >= 0) close(file);
+    sqlite3_free(p->pieces);
+    sqlite3_free(p->description);
+    return code;
+}
+
+int tiles_write(const tiles_job *job, tiles_report *report, char **error) {
+    pyramid p = {.job = job};
+    tiles *t = NULL;
+    *report = (tiles_report){0};
+    sqlite3 *db = job->connect(job->context);
+    if (!db) return SQLITE_CANTOPEN;
+    int code = tiles_open(db, &t);
+    if (code == SQLITE_OK) code = tiles_begin(t, job->terrain, error);
+    if (code == SQLITE_OK) {
+        code = write_all(&p, t, report, error);
+        tiles_end(t);
+    }
+    tiles_close(t);
+    sqlite3_close(db);
+    return code;
+}

@@ -1,0 +1,70 @@
+/* tiles.h - terrain as tiles for globes: quantized-mesh 1.0 (CesiumGS/quantized-mesh), cut from the terrain's own
+ * mesh, with a proven error.
+ *
+ * Tiles divide the globe in squares of 180 / 2^z degrees, x from -180 degrees on, y from the south (TMS, global
+ * geodetic). The bytes of a tile are a function of the terrain alone: the service and the command give the same.
+ *
+ * Results are SQLite's codes; with anything but SQLITE_OK *error may hold a sentence, to be released with
+ * sqlite3_free. One `tiles` per connection; different ones may be used by different threads.
+ */
+#ifndef RQT_TILES_H
+#define RQT_TILES_H
+
+#include "store.h"
+
+enum { TILES_LEVELS = 25 }; /* 0 .. 24 */
+
+typedef struct tiles tiles;
+int tiles_open(sqlite3 *db, tiles **out);
+/* Before the connection is closed. */
+void tiles_close(tiles *t);
+/* As store_limits: of the mesh of one tile. */
+void tiles_limit(tiles *t, int64_t triangles);
+
+/* Between tiles_begin and tiles_end one state of the terrain is seen (NULL: the only one). A terrain that has no
+ * tiles, for it is not in longitude and latitude on WGS 84, is SQLITE_ERROR with a sentence that says so. */
+int tiles_begin(tiles *t, const char *terrain, char **error);
+void tiles_end(tiles *t);
+/* The last level: the first whose tiles are no more than 64 samples a side. */
+int tiles_finest(const tiles *t);
+
+/* Tiles x0..x1 by y0..y1 of a level. */
+typedef struct tile_range {
+    int32_t x0, x1, y0, y1;
+} tile_range;
+/* The tiles of a level: those that have a triangle, each in one range, from the south, then from the west. Good
+ * until the next tiles_begin. */
+int tiles_available(tiles *t, int z, const tile_range **ranges, size_t *count, char **error);
+
+typedef struct tile_bytes {
+    uint8_t *bytes; /* to be released with sqlite3_free */
+    size_t size;    /* 0: there is no such tile */
+} tile_bytes;
+#define TILES_MEDIA_TYPE "application/vnd.quantized-mesh"
+/* The description of levels first..last for clients: layer.json. */
+int tiles_layer(tiles *t, int first, int last, tile_bytes *out, char **error);
+/* One tile. Any z, x, y may be asked for. */
+int tiles_make(tiles *t, int z, int32_t x, int32_t y, tile_bytes *out, char **error);
+
+/* ------------------------------------------------------------------------------------------------- to disk -- */
+typedef struct tiles_job {
+    const char *database, *terrain, *folder;
+    int first, last; /* levels; last beyond the finest: the finest */
+    bool gzip;
+    int workers;
+    /* A connection for a worker, with the SQL functions or without; NULL after a sentence of its own. */
+    sqlite3 *(*connect)(void *context);
+    /* So many tiles of so many are there; false stops (SQLITE_INTERRUPT). Called by one thread. May be NULL. */
+    bool (*progress)(void *context, int64_t done, int64_t all);
+    void *context;
+} tiles_job;
+typedef struct tiles_report {
+    int64_t tiles, written; /* of the levels; those that were not there before */
+    int64_t bytes;          /* written */
+    int finest;             /* level that was written last */
+} tiles_report;
+/* Writes FOLDER/z/x/y.terrain and at last FOLDER/layer.json, each file whole or not at all. A folder of the same
+ * job that did not finish is gone on with; one of another terrain, state or of other options is refused. */
+int tiles_write(const tiles_job *job, tiles_report *report, char **error);
+
+#endif
