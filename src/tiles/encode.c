@@ -25,6 +25,7 @@ typedef struct writer {
     bool no_memory;
 } writer;
 
+/* bytes NULL: room for them. */
 static void put(writer *w, const void *bytes, size_t size) {
     if (w->no_memory) return;
     if (w->size + size > w->capacity) {
@@ -35,7 +36,7 @@ static void put(writer *w, const void *bytes, size_t size) {
         w->bytes = more;
         w->capacity = capacity;
     }
-    memcpy(w->bytes + w->size, bytes, size);
+    if (bytes) memcpy(w->bytes + w->size, bytes, size);
     w->size += size;
 }
 
@@ -67,11 +68,26 @@ static void put_header(writer *w, const tile_plan *plan, const tile_globe *globe
     for (int k = 0; k < 3; k++) put_double(w, globe->horizon[k]);
 }
 
+/* Room for so many numbers of so many bytes, to be written; NULL: no memory. */
+static uint8_t *make_room(writer *w, size_t count, size_t size) {
+    const size_t at = w->size;
+    put(w, NULL, count * size);
+    return w->no_memory ? NULL : w->bytes + at;
+}
+
+static uint8_t *write_number(uint8_t *p, uint32_t n, size_t size) {
+    p[0] = (uint8_t)n;
+    p[1] = (uint8_t)(n >> 8);
+    if (size == 4) p[2] = (uint8_t)(n >> 16), p[3] = (uint8_t)(n >> 24);
+    return p + size;
+}
+
 static void put_differences(writer *w, const uint16_t *values, size_t count) {
+    uint8_t *p = make_room(w, count, 2);
     int before = 0;
-    for (size_t i = 0; i < count; i++) {
+    for (size_t i = 0; p && i < count; i++) {
         const int by = values[i] - before;
-        put_number(w, (uint32_t)(by < 0 ? -2 * by - 1 : 2 * by), 2);
+        p = write_number(p, (uint32_t)(by < 0 ? -2 * by - 1 : 2 * by), 2);
         before = values[i];
     }
 }
@@ -80,8 +96,9 @@ static void put_triangles(writer *w, const rqt_cut *cut, size_t index) {
     uint32_t highest = 0;
     while (w->size % index) put_number(w, 0, 1);
     put_number(w, cut->triangle_count, 4);
-    for (size_t i = 0; i < 3 * cut->triangle_count; i++) {
-        put_number(w, highest - cut->triangles[i], index);
+    uint8_t *p = make_room(w, 3 * cut->triangle_count, index);
+    for (size_t i = 0; p && i < 3 * cut->triangle_count; i++) {
+        p = write_number(p, highest - cut->triangles[i], index);
         highest += cut->triangles[i] == highest;
     }
 }
@@ -93,10 +110,10 @@ static void put_sides(writer *w, const tile_mesh *mesh, size_t index) {
     }
 }
 
-static int put_normals(writer *w, tiles *t, const tile_mesh *mesh, char **error) {
+static int put_normals(writer *w, tiles *t, const tile_mesh *mesh, const tile_globe *globe, char **error) {
     const size_t size = 2 * mesh->cut.vertex_count;
     uint8_t *packed = sqlite3_malloc64(size + 1);
-    const int code = packed ? globe_normals(t, mesh, packed, error) : SQLITE_NOMEM;
+    const int code = packed ? globe_normals(t, mesh, globe, packed, error) : SQLITE_NOMEM;
     if (code == SQLITE_OK) {
         put_number(w, NORMALS, 1);
         put_number(w, size, 4);
@@ -151,7 +168,10 @@ int encode_tile(tiles *t, const tile_place *place, const tile_mesh *mesh, tile_b
     const size_t index = cut->vertex_count > SMALL_INDICES ? 4 : 2;
     tile_globe globe;
     int code = globe_make(mesh, &globe);
-    if (code != SQLITE_OK) return code;
+    if (code != SQLITE_OK) {
+        globe_free(&globe);
+        return code;
+    }
     writer w = {.capacity = 4096 + HEADER + 8 * cut->vertex_count + (3 * cut->triangle_count + 1024) * index};
     w.bytes = sqlite3_malloc64(w.capacity);
     w.no_memory = !w.bytes;
@@ -162,7 +182,7 @@ int encode_tile(tiles *t, const tile_place *place, const tile_mesh *mesh, tile_b
     put_differences(&w, mesh->h, cut->vertex_count);
     put_triangles(&w, cut, index);
     put_sides(&w, mesh, index);
-    code = put_normals(&w, t, mesh, error);
+    code = put_normals(&w, t, mesh, &globe, error);
     if (t->plan->has_sea) put_water(&w, t, place);
     put_metadata(&w, t->plan, place, mesh);
     globe_free(&globe);

@@ -32,29 +32,47 @@ static double dot(const double a[3], const double b[3]) {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-static void place_all(const tile_mesh *mesh, double *xyz) {
+/* Vertices have few longitudes and latitudes: each is kept for the next that has it. */
+enum { KEPT_ANGLES = 1024 };
+typedef struct kept_angle {
+    double degrees, sine, cosine;
+} kept_angle;
+
+static const kept_angle *find_angle(kept_angle kept[KEPT_ANGLES], uint16_t number, double degrees) {
+    kept_angle *k = &kept[number % KEPT_ANGLES];
+    if (k->degrees != degrees) *k = (kept_angle){degrees, sin(degrees * DEGREE), cos(degrees * DEGREE)};
+    return k;
+}
+
+static void place_all(const tile_mesh *mesh, tile_globe *globe) {
     const double e2 = F * (2 - F);
+    kept_angle lons[KEPT_ANGLES], lats[KEPT_ANGLES];
+    for (int i = 0; i < KEPT_ANGLES; i++) lons[i] = lats[i] = (kept_angle){.cosine = 1};
     for (size_t i = 0; i < mesh->cut.vertex_count; i++) {
         const double *p = mesh->lonlath + 3 * i;
-        const double lon = p[0] * DEGREE, lat = p[1] * DEGREE, sine = sin(lat), cosine = cos(lat);
-        const double n = A / sqrt(1 - e2 * sine * sine);
-        xyz[3 * i] = (n + p[2]) * cosine * cos(lon);
-        xyz[3 * i + 1] = (n + p[2]) * cosine * sin(lon);
-        xyz[3 * i + 2] = (n * (1 - e2) + p[2]) * sine;
+        const kept_angle *lon = find_angle(lons, mesh->u[i], p[0]), *lat = find_angle(lats, mesh->v[i], p[1]);
+        const double n = A / sqrt(1 - e2 * lat->sine * lat->sine);
+        globe->angles[i] = (tile_angles){lon->sine, lon->cosine, lat->sine, lat->cosine};
+        globe->xyz[3 * i] = (n + p[2]) * lat->cosine * lon->cosine;
+        globe->xyz[3 * i + 1] = (n + p[2]) * lat->cosine * lon->sine;
+        globe->xyz[3 * i + 2] = (n * (1 - e2) + p[2]) * lat->sine;
     }
 }
 
 static void find_sphere(const double *xyz, size_t count, tile_globe *globe) {
     double low[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, high[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL}, most = 0;
-    for (size_t i = 0; i < 3 * count; i++) {
-        low[i % 3] = fmin(low[i % 3], xyz[i]);
-        high[i % 3] = fmax(high[i % 3], xyz[i]);
-    }
+    for (size_t i = 0; i < count; i++)
+        for (int k = 0; k < 3; k++) {
+            const double x = xyz[3 * i + (size_t)k];
+            if (x < low[k]) low[k] = x;
+            if (x > high[k]) high[k] = x;
+        }
     for (int k = 0; k < 3; k++) globe->centre[k] = (low[k] + high[k]) / 2;
     for (size_t i = 0; i < count; i++) {
         const double *p = xyz + 3 * i;
         const double from[3] = {p[0] - globe->centre[0], p[1] - globe->centre[1], p[2] - globe->centre[2]};
-        most = fmax(most, dot(from, from));
+        const double square = dot(from, from);
+        if (square > most) most = square;
     }
     globe->radius = sqrt(most) * (1 + 1e-9) + 1e-6;
 }
@@ -66,12 +84,12 @@ static void find_horizon(const double *xyz, size_t count, tile_globe *globe) {
     for (int k = 0; k < 3; k++) direction[k] = exists ? direction[k] / length : k == 0;
     for (size_t i = 0; i < count && exists; i++) {
         const double p[3] = {xyz[3 * i] / A, xyz[3 * i + 1] / A, xyz[3 * i + 2] / B};
-        const double square = dot(p, p), m2 = fmax(1, square), along = dot(p, direction) / sqrt(square);
-        const double across = sqrt(fmax(0, 1 - along * along)); /* of the angle t */
+        const double square = dot(p, p), m2 = square > 1 ? square : 1, along = dot(p, direction) / sqrt(square);
+        const double across = along < 1 ? sqrt(1 - along * along) : 0; /* of the angle t */
         /* cos(t + acos(1/m)) */
         const double cosine = (along - across * sqrt(m2 - 1)) / sqrt(m2);
         exists = cosine > 1e-6;
-        if (exists) most = fmax(most, 1 / cosine);
+        if (exists && 1 / cosine > most) most = 1 / cosine;
     }
     /* Cosines near 1 lose digits: t is known to some 1e-8. */
     const double r = exists ? most * (1 + 1e-7) : NEVER_HIDDEN;
@@ -80,9 +98,10 @@ static void find_horizon(const double *xyz, size_t count, tile_globe *globe) {
 
 int globe_make(const tile_mesh *mesh, tile_globe *globe) {
     const size_t count = mesh->cut.vertex_count;
-    *globe = (tile_globe){.xyz = sqlite3_malloc64((3 * count + 1) * sizeof *globe->xyz)};
-    if (!globe->xyz) return SQLITE_NOMEM;
-    place_all(mesh, globe->xyz);
+    *globe = (tile_globe){.xyz = sqlite3_malloc64((3 * count + 1) * sizeof *globe->xyz),
+                          .angles = sqlite3_malloc64((count + 1) * sizeof *globe->angles)};
+    if (!globe->xyz || !globe->angles) return SQLITE_NOMEM;
+    place_all(mesh, globe);
     find_sphere(globe->xyz, count, globe);
     find_horizon(globe->xyz, count, globe);
     return SQLITE_OK;
@@ -90,6 +109,7 @@ int globe_make(const tile_mesh *mesh, tile_globe *globe) {
 
 void globe_free(tile_globe *globe) {
     sqlite3_free(globe->xyz);
+    sqlite3_free(globe->angles);
     *globe = (tile_globe){0};
 }
 
@@ -132,15 +152,14 @@ static void pack(const double n[3], uint8_t packed[2]) {
 }
 
 /* From east, north, up at a place. */
-static void turn(const double lonlat[2], const double enu[3], double out[3]) {
-    const double sl = sin(lonlat[0] * DEGREE), cl = cos(lonlat[0] * DEGREE), sp = sin(lonlat[1] * DEGREE),
-                 cp = cos(lonlat[1] * DEGREE);
-    out[0] = -sl * enu[0] - sp * cl * enu[1] + cp * cl * enu[2];
-    out[1] = cl * enu[0] - sp * sl * enu[1] + cp * sl * enu[2];
-    out[2] = cp * enu[1] + sp * enu[2];
+static void turn(const tile_angles *at, const double enu[3], double out[3]) {
+    const double outward = at->cos_lat * enu[2] - at->sin_lat * enu[1]; /* from the axis */
+    out[0] = at->cos_lon * outward - at->sin_lon * enu[0];
+    out[1] = at->sin_lon * outward + at->cos_lon * enu[0];
+    out[2] = at->cos_lat * enu[1] + at->sin_lat * enu[2];
 }
 
-int globe_normals(tiles *t, const tile_mesh *mesh, uint8_t *packed, char **error) {
+int globe_normals(tiles *t, const tile_mesh *mesh, const tile_globe *globe, uint8_t *packed, char **error) {
     const size_t count = mesh->cut.vertex_count;
     rqt_patch samples = {.vertices = sqlite3_malloc64((4 * count + 1) * sizeof *samples.vertices)};
     around *all = sqlite3_malloc64((count + 1) * sizeof *all);
@@ -155,7 +174,7 @@ int globe_normals(tiles *t, const tile_mesh *mesh, uint8_t *packed, char **error
         double enu[3] = {0}, n[3];
         for (int k = 0; k < all[i].count; k++, next += 3)
             for (int c = 0; c < 3; c++) enu[c] += (double)all[i].weight[k] * (double)next[c];
-        turn(mesh->lonlath + 3 * i, enu, n);
+        turn(&globe->angles[i], enu, n);
         pack(n, packed + 2 * i);
     }
     sqlite3_free(normals);

@@ -67,6 +67,7 @@ void plan_free(tile_plan *plan);
 typedef struct tile_turn {
     double west, east, north, south; /* samples */
     int64_t box[4];                  /* the same in 2^-20 samples, as regions have it: west, east, north, south */
+    double cut[4];                   /* the same in samples: where the mesh ends */
 } tile_turn;
 enum { MOST_TURNS = 4 };
 typedef struct tile_place {
@@ -99,15 +100,20 @@ typedef struct tile_mesh {
 int mesh_make(tiles *t, const tile_place *place, tile_mesh *mesh, char **error);
 void mesh_free(tile_mesh *mesh);
 
+/* Where a vertex is on the globe: sines and cosines of its longitude and latitude. */
+typedef struct tile_angles {
+    double sin_lon, cos_lon, sin_lat, cos_lat;
+} tile_angles;
 typedef struct tile_globe {
-    double *xyz; /* geocentric, of each vertex */
+    double *xyz;         /* geocentric, of each vertex */
+    tile_angles *angles; /* likewise */
     double centre[3], radius;
     double horizon[3];
 } tile_globe;
 int globe_make(const tile_mesh *mesh, tile_globe *globe);
 void globe_free(tile_globe *globe);
 /* Two bytes a vertex: oct-encoded normals of the terrain, geocentric. */
-int globe_normals(tiles *t, const tile_mesh *mesh, uint8_t *packed, char **error);
+int globe_normals(tiles *t, const tile_mesh *mesh, const tile_globe *globe, uint8_t *packed, char **error);
 
 enum { WATER_SIDE = 256 };
 int water_read(tiles *t, tile_plan *plan, char **error);

@@ -39,7 +39,7 @@
 
 #define DEGREE 0.017453292519943295
 /* Samples are on a grid of 2^-20 with the sides; places where a side cuts an edge are within 2^-30 of it. */
-#define ON_SIDE ldexp(1, -21)
+#define ON_SIDE 0x1p-21
 enum { WEST, SOUTH, EAST, NORTH, SIDES };
 
 typedef struct waiting {
@@ -52,14 +52,15 @@ static bool is_interrupted(void *context) {
     return store_is_interrupted(w->store, &w->code);
 }
 
-/* Metres in a column and a row, at most, on any leaf; and the largest leaf's columns and rows. */
-typedef struct slopes {
-    double along, down, columns, rows;
-} slopes;
+/* The largest leaf's columns and rows. */
+typedef struct extent {
+    double columns, rows;
+} extent;
 
-static void measure_slopes(const tiles *t, const rqt_patch *patch, const double moves[2], slopes *s, double *most) {
+/* *most: metres that a leaf may rise in a move of so many columns and rows. */
+static void measure_slopes(const tiles *t, const rqt_patch *patch, const double moves[2], extent *s, double *most) {
     const double quantum = fabs(rqt_unit_factor(&t->terrain->unit)) / t->terrain->unit.d;
-    *s = (slopes){0};
+    *s = (extent){0};
     *most = 0;
     for (size_t i = 0; i < patch->triangle_count; i++) {
         const uint32_t *corner = patch->triangles + 3 * i;
@@ -70,9 +71,13 @@ static void measure_slopes(const tiles *t, const rqt_patch *patch, const double 
         const double area = bx * cy - cx * by;
         const double along = fabs((bz * cy - cz * by) / area) * quantum,
                      down = fabs((cz * bx - bz * cx) / area) * quantum;
-        s->columns = fmax(s->columns, fmax(fmax(fabs(bx), fabs(cx)), fabs(bx - cx)));
-        s->rows = fmax(s->rows, fmax(fmax(fabs(by), fabs(cy)), fabs(by - cy)));
-        *most = fmax(*most, along * moves[0] + down * moves[1]);
+        const double wide[3] = {fabs(bx), fabs(cx), fabs(bx - cx)}, high[3] = {fabs(by), fabs(cy), fabs(by - cy)};
+        for (int k = 0; k < 3; k++) {
+            if (wide[k] > s->columns) s->columns = wide[k];
+            if (high[k] > s->rows) s->rows = high[k];
+        }
+        const double sloping = along * moves[0] + down * moves[1];
+        if (sloping > *most) *most = sloping;
     }
 }
 
@@ -86,7 +91,7 @@ static void state_errors(const tiles *t, const tile_place *place, const rqt_patc
         hypot(mesh->move[0] * DEGREE * plan->radius * cos(least * DEGREE), mesh->move[1] * DEGREE * plan->radius),
         mesh->move[2]);
     const double moves[2] = {mesh->move[0] / at->dx, mesh->move[1] / -at->dy};
-    slopes s;
+    extent s;
     double sloping;
     measure_slopes(t, patch, moves, &s, &sloping);
     /* Doubles of places in space and of columns: nanometres. */
@@ -102,16 +107,15 @@ static void state_errors(const tiles *t, const tile_place *place, const rqt_patc
 static const tile_turn *turn_of(const tile_place *place, double col) {
     for (int i = 0; i < place->turns; i++) {
         const tile_turn *turn = &place->turn[i];
-        if (col >= ldexp((double)turn->box[0], -20) - ON_SIDE && col <= ldexp((double)turn->box[1], -20) + ON_SIDE)
-            return turn;
+        if (col >= turn->cut[0] - ON_SIDE && col <= turn->cut[1] + ON_SIDE) return turn;
     }
     return &place->turn[0];
 }
 
-/* from, to: the tile's sides in samples; low, high: the same as regions have them. */
-static uint16_t quantise(double at, double from, double to, int64_t low, int64_t high) {
-    if (fabs(at - ldexp((double)low, -20)) < ON_SIDE) return 0;
-    if (fabs(at - ldexp((double)high, -20)) < ON_SIDE) return TILE_UNITS;
+/* from, to: the tile's sides in samples; low, high: where the mesh ends. */
+static uint16_t quantise(double at, double from, double to, double low, double high) {
+    if (fabs(at - low) < ON_SIDE) return 0;
+    if (fabs(at - high) < ON_SIDE) return TILE_UNITS;
     const double n = rint((at - from) / (to - from) * TILE_UNITS);
     return (uint16_t)(n < 1 ? 1 : n > TILE_UNITS - 1 ? TILE_UNITS - 1 : n);
 }
@@ -134,8 +138,8 @@ static int place_vertex(const tiles *t, const tile_place *place, tile_mesh *mesh
         if (!isfinite(height))
             return tiles_fail(error, "the geoid has no height at %.15g, %.15g", there[0], there[1]);
     }
-    mesh->u[i] = quantise(v->col, turn->west, turn->east, turn->box[0], turn->box[1]);
-    mesh->v[i] = quantise(v->row, turn->south, turn->north, turn->box[3], turn->box[2]);
+    mesh->u[i] = quantise(v->col, turn->west, turn->east, turn->cut[0], turn->cut[1]);
+    mesh->v[i] = quantise(v->row, turn->south, turn->north, turn->cut[3], turn->cut[2]);
     const double n = rint((height - plan->lowest) / plan->step);
     mesh->h[i] = (uint16_t)(n < 0 ? 0 : n > TILE_UNITS ? TILE_UNITS : n);
     out[0] = place->west + place->side * mesh->u[i] / TILE_UNITS;

@@ -197,6 +197,7 @@ static void place_columns(const tiles *t, double side, int32_t x, int turn, tile
     out->east = samples(-180 + (x + 1.0) * side + 360.0 * turn, at->x0, at->dx);
     out->box[0] = units(out->west);
     out->box[1] = units(out->east);
+    for (int i = 0; i < 2; i++) out->cut[i] = ldexp((double)out->box[i], -UNIT_BITS);
 }
 
 static void place_rows(const tiles *t, double side, int32_t y, tile_turn *out) {
@@ -205,6 +206,7 @@ static void place_rows(const tiles *t, double side, int32_t y, tile_turn *out) {
     out->north = samples(-90 + (y + 1.0) * side, at->y0, at->dy);
     out->box[2] = units(out->north);
     out->box[3] = units(out->south);
+    for (int i = 2; i < 4; i++) out->cut[i] = ldexp((double)out->box[i], -UNIT_BITS);
 }
 
 /* The turns on which the globe's 360 degrees may meet the raster. */
@@ -293,8 +295,7 @@ int plan_region(const tiles *t, const tile_place *place, rqt_region **region) {
     rqt_geometry *geometry = NULL;
     rqt_message why;
     for (int i = 0; i < place->turns; i++) {
-        double box[4];
-        for (int k = 0; k < 4; k++) box[k] = ldexp((double)place->turn[i].box[k], -UNIT_BITS);
+        const double *box = place->turn[i].cut;
         end += sprintf(end, "%s((%.17g %.17g,%.17g %.17g,%.17g %.17g,%.17g %.17g,%.17g %.17g))", i ? "," : "",
                        box[0], box[2], box[1], box[2], box[1], box[3], box[0], box[3], box[0], box[2]);
     }
