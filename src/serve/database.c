@@ -31,7 +31,8 @@ enum { INDEX_REGION = 32768 };
 struct database {
     const service *service;
     const char *path, *label;
-    sqlite3 *db; /* NULL: not open */
+    sqlite3 *db;  /* NULL: not open */
+    tiles *tiles; /* NULL: nobody has asked for one */
     struct stat file;
     uint64_t state; /* the last one seen; 0: none */
     bool is_damaged;
@@ -46,6 +47,8 @@ struct database {
 static void close_database(database *d) {
     for (int i = 0; i < d->kept_count; i++) sqlite3_finalize(d->kept[i].statement);
     d->kept_count = 0;
+    tiles_close(d->tiles);
+    d->tiles = NULL;
     sqlite3_close(d->db);
     d->db = NULL;
     d->state = 0;
@@ -211,6 +214,15 @@ void database_failed(database *d, request *r, int code, const char *sentence) {
     answer_failure(r, code, sentence ? sentence : sqlite3_errmsg(d->db));
     /* Also where memory ran out: what the connection keeps of blocks goes with it. */
     d->is_damaged = r->answer.status == MHD_HTTP_INTERNAL_SERVER_ERROR || (code & 0xFF) == SQLITE_NOMEM;
+}
+
+tiles *database_tiles(database *d, request *r) {
+    const int code = d->tiles ? SQLITE_OK : tiles_open(d->db, &d->tiles);
+    if (code == SQLITE_OK)
+        tiles_limit(d->tiles, d->service->options.max_triangles);
+    else
+        database_failed(d, r, code, NULL);
+    return d->tiles;
 }
 
 const char *database_label(const database *d) {

@@ -13,6 +13,8 @@
 #define REGION " bbox wkt "
 #define TERRAIN "/collections/{terrain}"
 
+enum { MOST_DIGITS = 8 }; /* of a number in a path: it fits an int */
+
 const endpoint endpoints[] = {
     {"landing", "/", " f ", answer_landing, false},
     {"openapi", "/openapi.json", " ", answer_openapi, false},
@@ -27,26 +29,36 @@ const endpoint endpoints[] = {
     {"verify", TERRAIN "/verify", REGION "eps! " OPTION_NAMES, answer_verify, false},
     {"explain", TERRAIN "/explain", REGION "eps! " OPTION_NAMES, answer_explain, false},
     {"area", TERRAIN "/area", REGION "eps! " OPTION_NAMES, answer_area, false},
+    {"layer", TERRAIN "/tiles/quantized-mesh/layer.json", " ", answer_layer, false},
+    {"tile", TERRAIN "/tiles/quantized-mesh/{z}/{x}/{y}.terrain", " ", answer_tile, false},
     {"health", "/healthz", " ", answer_health, true},
     {"metrics", "/metrics", " ", answer_metrics, true},
     {"page", "/{file}", " ", NULL, false},
 };
 const int endpoint_count = sizeof endpoints / sizeof *endpoints;
 
-/* Does a path of the table match the request's? The terrain of the path goes into the request. */
+/* Is a segment what a part of n bytes of a path in the table stands for? "{z}": a number, "{y}.terrain": one with
+ * that behind it, anything else itself. The terrain of the path goes into the request. */
+static bool is_segment(request *r, const char *segment, const char *part, size_t n) {
+    if (strncmp(part, "{file}", n) == 0) return page_is(r);
+    if (strncmp(part, "{terrain}", n) == 0) {
+        r->terrain = segment;
+        return true;
+    }
+    if (*part == '{') {
+        const char *close = memchr(part, '}', n);
+        const size_t digits = strspn(segment, "0123456789"), rest = n - (size_t)(close + 1 - part);
+        if (digits == 0 || digits > MOST_DIGITS || (digits > 1 && *segment == '0')) return false;
+        return strlen(segment + digits) == rest && memcmp(segment + digits, close + 1, rest) == 0;
+    }
+    return strlen(segment) == n && memcmp(segment, part, n) == 0;
+}
+
 static bool is_path(request *r, const char *path) {
     int i = 0;
     for (const char *p = path + 1; *p; i++) {
         const size_t n = strcspn(p, "/");
-        if (i == r->segment_count) return false;
-        const char *segment = r->segments[i];
-        if (strncmp(p, "{file}", n) == 0) {
-            if (!page_is(r)) return false;
-        } else if (strncmp(p, "{terrain}", n) == 0) {
-            r->terrain = segment;
-        } else if (strlen(segment) != n || memcmp(segment, p, n) != 0) {
-            return false;
-        }
+        if (i == r->segment_count || !is_segment(r, r->segments[i], p, n)) return false;
         p += n + (p[n] == '/');
     }
     return i == r->segment_count;

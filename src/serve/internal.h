@@ -9,6 +9,7 @@
  *   query.c      parameters as what SQL statements are bound to
  *   meshes.c     range, view, delta
  *   tables.c     height, profile, verify, explain, area
+ *   globe.c      tiles for globes
  *   documents.c  landing page, conformance, collections
  *   page.c       the files of web/, compiled in
  *   answer.c     bytes, problems (RFC 9457), rows as JSON
@@ -21,6 +22,7 @@
 #define RQT_SERVE_INTERNAL_H
 
 #include "serve.h"
+#include "tiles.h"
 
 #include <cjson/cJSON.h>
 #include <microhttpd.h>
@@ -47,7 +49,7 @@ void buffer_string(buffer *b, const char *text);
 void buffer_free(buffer *b);
 
 /* ------------------------------------------------------------------------------------------------- requests -- */
-enum { MOST_SEGMENTS = 4, MOST_PARAMETERS = 32, MOST_TARGET = 32768 };
+enum { MOST_SEGMENTS = 7, MOST_PARAMETERS = 32, MOST_TARGET = 32768 };
 /* For MHD: a connection's memory holds target and headers twice over. */
 enum { CONNECTION_MEMORY = 131072 };
 
@@ -145,6 +147,8 @@ void database_end(database *d);
 /* A statement of this text (static), ready to be bound; kept for the next time. NULL: the answer says why. */
 sqlite3_stmt *database_prepare(database *d, request *r, const char *sql);
 sqlite3 *database_handle(database *d);
+/* Its tiles; NULL: the answer says why. */
+tiles *database_tiles(database *d, request *r);
 /* Something has failed with this code; sentence NULL: what the connection says of it. It becomes the answer. A
  * connection that met damage is closed with database_end, and so is one without memory, whose blocks then go. */
 void database_failed(database *d, request *r, int code, const char *sentence);
@@ -237,6 +241,8 @@ void answer_profile(worker *w, request *r);
 void answer_verify(worker *w, request *r);
 void answer_explain(worker *w, request *r);
 void answer_area(worker *w, request *r);
+void answer_layer(worker *w, request *r);
+void answer_tile(worker *w, request *r);
 void answer_health(worker *w, request *r);
 void answer_metrics(worker *w, request *r);
 
