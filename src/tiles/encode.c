@@ -7,8 +7,7 @@
  *     sides       west, south, east, north: count, indices
  *     extensions  id (1 byte), length (4): 1 oct-encoded normals, 2 water mask (terrains with a sea), 4 metadata
  *
- * A vertex has the number of its first use, as the cut has numbered it: so each new one is the next, which is what
- * the high-water mark wants.
+ * A vertex has the number of its first use: so each new one is the next, which is what the high-water mark wants.
  */
 #include "internal.h"
 
