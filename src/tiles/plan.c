@@ -36,6 +36,7 @@
 #define GEOID_HIGHEST 120.0 /* EGM96 lies between -107 and 86 */
 #define ROOT_ERROR (EQUATOR * 2 * M_PI * 0.25 / (65 * 2))
 enum { LARGEST_TILE = 64, FIRST_STEP = -10, UNIT_BITS = 20 };
+#define LAST_EPS 0.625
 #define FARTHEST ((int64_t)1 << 60) /* units: as regions have it */
 
 int tiles_fail(char **error, const char *format, ...) {
@@ -129,7 +130,7 @@ static void set_levels(const store_terrain *t, tile_plan *plan) {
         plan->finest = z;
         level->eps = level->geometric_error - move;
         if (side > LARGEST_TILE * sample) continue;
-        level->eps = fmin(level->eps, quantum / 2);
+        level->eps = fmin(level->eps, quantum * LAST_EPS);
         break;
     }
 }

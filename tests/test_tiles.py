@@ -1,0 +1,615 @@
+"""Tiles for globes: decoded here from their bytes alone, and put beside the rasters that they are of.
+
+The decoder is written from the format's description (CesiumGS/quantized-mesh), the errors are measured at every sample, and
+the places in space are computed here: nothing is asked of the program but tiles.
+"""
+import bisect
+import gzip
+import itertools
+import json
+import math
+import os
+import random
+import signal
+import struct
+import subprocess
+import time
+from fractions import Fraction
+
+import serve_support as service
+import sql_support as s
+
+SEED = int(os.environ.get("RQT_SEED", "1"))
+print("seed %d" % SEED)
+RANDOM = random.Random(SEED)
+UNITS = 32767
+A, F = 6378137.0, 1 / 298.257223563
+B, E2 = A * (1 - F), F * (2 - F)
+
+
+def ecef(lon, lat, h):
+    lon, lat = math.radians(lon), math.radians(lat)
+    n = A / math.sqrt(1 - E2 * math.sin(lat) ** 2)
+    return (n + h) * math.cos(lat) * math.cos(lon), (n + h) * math.cos(lat) * math.sin(lon), (n * (1 - E2) + h) * math.sin(lat)
+
+
+def minus(a, b):
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def dot(a, b):
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+class Bytes:
+    def __init__(self, data):
+        self.data, self.at = data, 0
+
+    def take(self, form):
+        values = struct.unpack_from("<" + form, self.data, self.at)
+        self.at += struct.calcsize("<" + form)
+        return values
+
+
+class Tile:
+    """What a client reads of a tile. problem: the first thing that is not as the format has it."""
+
+    def __init__(self, z, x, y, data):
+        self.z, self.x, self.y, self.problem, self.size = z, x, y, None, len(data)
+        self.side = 180 / 2**z
+        self.west, self.south = -180 + x * self.side, -90 + y * self.side
+        b = Bytes(data)
+        self.middle = b.take("3d")
+        self.low, self.high = b.take("2f")
+        self.centre, self.radius = b.take("3d"), b.take("d")[0]
+        self.horizon = b.take("3d")
+        self.count = b.take("I")[0]
+        self.u, self.v, self.h = (self.differences(b) for _ in range(3))
+        wide = self.count > 65536
+        index, size = ("I", 4) if wide else ("H", 2)
+        b.at += -b.at % size
+        codes = b.take("%d%s" % (3 * b.take("I")[0], index))
+        highest, self.triangles = 0, []
+        for code in codes:
+            if code > highest:
+                self.problem = "an index below 0"
+            self.triangles.append(highest - code)
+            highest += code == 0
+        if highest != self.count:
+            self.problem = "%d vertices are used, %d are there" % (highest, self.count)
+        self.triangles = [self.triangles[i:i + 3] for i in range(0, len(self.triangles), 3)]
+        self.edges = [b.take("%d%s" % (b.take("I")[0], index)) for _ in range(4)]
+        self.extensions = {}
+        while b.at < len(data):
+            number, length = b.take("BI")
+            self.extensions[number] = data[b.at:b.at + length]
+            b.at += length
+        if b.at != len(data):
+            self.problem = "%d bytes, and it says %d" % (len(data), b.at)
+        length = struct.unpack("<I", self.extensions[4][:4])[0]
+        self.metadata = json.loads(self.extensions[4][4:4 + length])
+        step = (self.high - self.low) / UNITS
+        self.step = step
+        # As clients do: a linear interpolation.
+        self.places = [(self.west + u * self.side / UNITS, self.south + v * self.side / UNITS, self.low + (self.high - self.low) * (h / UNITS))
+                       for u, v, h in zip(self.u, self.v, self.h)]
+        self.xyz = [ecef(*p) for p in self.places]
+
+    def differences(self, b):
+        value, values = 0, []
+        for code in b.take("%dH" % self.count):
+            value += (code >> 1) ^ -(code & 1)
+            if not 0 <= value <= UNITS:
+                self.problem = "a number out of range"
+            values.append(value)
+        return values
+
+    def normal(self, i):
+        x, y = (c / 255 * 2 - 1 for c in self.extensions[1][2 * i:2 * i + 2])
+        z = 1 - abs(x) - abs(y)
+        if z < 0:
+            x, y = (1 - abs(y)) * (1 if x >= 0 else -1), (1 - abs(x)) * (1 if y >= 0 else -1)
+        length = math.sqrt(x * x + y * y + z * z)
+        return x / length, y / length, z / length
+
+    def area(self):
+        """Twice the sum of the areas, signed, in units."""
+        u, v = self.u, self.v
+        return sum((u[b] - u[a]) * (v[c] - v[a]) - (u[c] - u[a]) * (v[b] - v[a]) for a, b, c in self.triangles)
+
+
+def listed(layer):
+    """Every tile that layer.json has, z,x,y; some twice, if it has them so."""
+    return [(z, x, y) for z, ranges in enumerate(layer["available"]) for r in ranges
+            for y in range(r["startY"], r["endY"] + 1) for x in range(r["startX"], r["endX"] + 1)]
+
+
+def files(folder):
+    found = {}
+    for path, _, names in os.walk(folder):
+        for name in names:
+            full = os.path.join(path, name)
+            with open(full, "rb") as f:
+                found[os.path.relpath(full, folder)] = f.read()
+    return found
+
+
+class Pyramid:
+    def __init__(self, name, database, raster, x0, y0, dx, dy, options=()):
+        self.name, self.folder, self.database = name, s.temp(name + ".tiles"), database
+        self.x0, self.y0, self.dx, self.dy, self.raster = x0, y0, dx, dy, raster
+        out, status = s.run([s.RQT, "tiles", database, "-o", self.folder, *options])
+        s.equal(name + ": rqt tiles says nothing in a pipe", (out, status), ("", 0))
+        with open(os.path.join(self.folder, "layer.json"), encoding="utf-8") as f:
+            self.layer = json.load(f)
+        self.tiles = {}
+        for path, data in files(self.folder).items():
+            if path.endswith(".terrain"):
+                z, x, y = map(int, path[:-len(".terrain")].split("/"))
+                self.tiles[z, x, y] = Tile(z, x, y, gzip.decompress(data) if "--gzip" in options else data)
+        self.space = {}
+
+    def sample(self, col, row):
+        z = self.raster[row][col]
+        return None if z is None else (self.x0 + col * self.dx, self.y0 + row * self.dy, z)
+
+    def place(self, col, row):
+        key = col, row
+        if key not in self.space:
+            self.space[key] = ecef(*self.sample(col, row))
+        return self.space[key]
+
+
+def distance_to_triangle(p, a, b, c):
+    """Of a point in space (Ericson, Real-Time Collision Detection, 5.1.5)."""
+    ab, ac, ap = minus(b, a), minus(c, a), minus(p, a)
+    d1, d2 = dot(ab, ap), dot(ac, ap)
+
+    def to(base, way=None, t=0.0):
+        q = base if way is None else tuple(base[k] + t * way[k] for k in range(3))
+        return math.dist(p, q)
+    if d1 <= 0 and d2 <= 0:
+        return to(a)
+    bp = minus(p, b)
+    d3, d4 = dot(ab, bp), dot(ac, bp)
+    if d3 >= 0 and d4 <= d3:
+        return to(b)
+    if d1 * d4 - d3 * d2 <= 0 <= d1 and d3 <= 0:
+        return to(a, ab, d1 / (d1 - d3))
+    cp = minus(p, c)
+    d5, d6 = dot(ab, cp), dot(ac, cp)
+    if d6 >= 0 and d5 <= d6:
+        return to(c)
+    if d5 * d2 - d1 * d6 <= 0 <= d2 and d6 <= 0:
+        return to(a, ac, d2 / (d2 - d6))
+    va = d3 * d6 - d5 * d4
+    if va <= 0 and d4 >= d3 and d5 >= d6:
+        return to(b, minus(c, b), (d4 - d3) / ((d4 - d3) + (d5 - d6)))
+    vb, vc = d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
+    total = va + vb + vc
+    if total == 0:
+        return min(to(a), to(b), to(c))
+    v, w = vb / total, vc / total
+    return math.dist(p, tuple(a[k] + v * ab[k] + w * ac[k] for k in range(3)))
+
+
+def measure(p, tile):
+    """Every sample of the tile beside its mesh: the largest share of what is allowed above or below it, and in space; samples
+    that lie well inside and have no mesh. Samples outside the mesh's outline count for nothing."""
+    height, width = len(p.raster), len(p.raster[0])
+    cols = [c for c in range(width) if 0 <= p.x0 + c * p.dx - tile.west <= tile.side]
+    rows = [r for r in reversed(range(height)) if 0 <= p.y0 + r * p.dy - tile.south <= tile.side]
+    us = [(p.x0 + c * p.dx - tile.west) / tile.side * UNITS for c in cols]
+    vs = [(p.y0 + r * p.dy - tile.south) / tile.side * UNITS for r in rows]
+    vertical, space, covered = 0.0, 0.0, set()
+    allowed, error = tile.metadata["verticalError"], tile.metadata["error"]
+    doubtful = []
+    for a, b, c in tile.triangles:
+        ua, va, ub, vb, uc, vc = tile.u[a], tile.v[a], tile.u[b], tile.v[b], tile.u[c], tile.v[c]
+        area = (ub - ua) * (vc - va) - (uc - ua) * (vb - va)
+        if area == 0:
+            continue
+        i0, i1 = bisect.bisect_left(us, min(ua, ub, uc)), bisect.bisect_right(us, max(ua, ub, uc))
+        j0, j1 = bisect.bisect_left(vs, min(va, vb, vc)), bisect.bisect_right(vs, max(va, vb, vc))
+        for j in range(j0, j1):
+            v = vs[j]
+            for i in range(i0, i1):
+                u = us[i]
+                wb = ((u - ua) * (vc - va) - (uc - ua) * (v - va)) / area
+                wc = ((ub - ua) * (v - va) - (u - ua) * (vb - va)) / area
+                if wb < -1e-9 or wc < -1e-9 or wb + wc > 1 + 1e-9:
+                    continue
+                z = p.raster[rows[j]][cols[i]]
+                if z is None:
+                    continue
+                wa = 1 - wb - wc
+                covered.add((cols[i], rows[j]))
+                vertical = max(vertical, abs(wa * tile.places[a][2] + wb * tile.places[b][2] + wc * tile.places[c][2] - z) / allowed)
+                xa, xb, xc = tile.xyz[a], tile.xyz[b], tile.xyz[c]
+                d = math.dist(p.place(cols[i], rows[j]), [wa * xa[k] + wb * xb[k] + wc * xc[k] for k in range(3)])
+                if d <= error:
+                    space = max(space, d / error)
+                else:
+                    doubtful.append((cols[i], rows[j]))
+    for col, row in doubtful: # nearer to another place of the mesh?
+        q = p.place(col, row)
+        space = max(space, min(distance_to_triangle(q, *(tile.xyz[k] for k in t)) for t in tile.triangles) / error)
+    far = [(c, r) for i, c in enumerate(cols) for j, r in enumerate(rows)
+           if 1 < us[i] < UNITS - 1 and 1 < vs[j] < UNITS - 1 and 0 < c < width - 1 and 0 < r < height - 1 and p.raster[r][c] is not None]
+    unit = tile.side / UNITS
+    inner = [(c, r) for c, r in far if min(c, width - 1 - c) * p.dx > unit and min(r, height - 1 - r) * -p.dy > unit]
+    return vertical, space, sum(1 for q in inner if q not in covered), len(covered)
+
+
+def is_hidden(camera, point):
+    """Does a client take it to be below the horizon? All scaled so that the Earth is a sphere of radius 1."""
+    to = minus(point, camera)
+    along, horizon = -dot(to, camera), dot(camera, camera) - 1
+    square = dot(to, to)
+    return along > horizon and (math.nan if math.isinf(square) else along * along / square) > horizon
+
+
+def is_point_hidden(camera, point):
+    """Truly, exactly enough: the sphere meets the line between the two."""
+    length = math.sqrt(dot(point, point))
+    if length < 1:
+        point = tuple(c / length for c in point)
+    way = minus(point, camera)
+    t = max(0.0, min(1.0, -dot(camera, way) / dot(way, way)))
+    nearest = tuple(camera[k] + t * way[k] for k in range(3))
+    return dot(nearest, nearest) < 1 + 1e-12
+
+
+def scaled(xyz):
+    return xyz[0] / A, xyz[1] / A, xyz[2] / B
+
+
+def horizon_fails(tile, cameras):
+    """Cameras for which the tile counts as hidden and is not; and for how many it counts as hidden."""
+    places = [scaled(q) for q in tile.xyz]
+    wrong = hidden = 0
+    centre = scaled(tile.centre)
+    length = math.sqrt(dot(centre, centre))
+    d = tuple(c / length for c in centre)
+    side = (d[1], -d[0], 0) if abs(d[2]) < 0.9 else (0, d[2], -d[1])
+    side = tuple(c / math.sqrt(dot(side, side)) for c in side)
+    up = (d[1] * side[2] - d[2] * side[1], d[2] * side[0] - d[0] * side[2], d[0] * side[1] - d[1] * side[0])
+    for _ in range(cameras):
+        distance = 1 + 10 ** RANDOM.uniform(-5, 1)
+        # Near the angle at which it sinks below the horizon.
+        angle = math.acos(1 / distance) + (RANDOM.uniform(-0.02, 0.1) if RANDOM.random() < 0.8 else RANDOM.uniform(0, 3))
+        turn = RANDOM.uniform(0, 2 * math.pi)
+        way = tuple(math.cos(turn) * side[k] + math.sin(turn) * up[k] for k in range(3))
+        camera = tuple(distance * (math.cos(angle) * d[k] + math.sin(angle) * way[k]) for k in range(3))
+        if is_hidden(camera, tile.horizon):
+            hidden += 1
+            wrong += not all(is_point_hidden(camera, q) for q in places)
+    return wrong, hidden
+
+
+SIDES = [("u", 0), ("v", 0), ("u", UNITS), ("v", UNITS)]
+
+
+def edge_of(tile, side):
+    """Decoded places and normals of the vertices of an edge, without the coordinate that the edge fixes: that is a double of
+    its own in each tile, and equal for powers of two."""
+    return [(tile.places[i], bytes(tile.extensions[1][2 * i:2 * i + 2])) for i in tile.edges[side]]
+
+
+def check_pyramid(p, is_whole, vertices_too=True):
+    name, tiles = p.name, p.tiles
+    every = list(tiles.values())
+    s.equal(name + ": every tile is as the format has it", [(t.z, t.x, t.y, t.problem) for t in every if t.problem], [])
+    s.equal(name + ": listed and there are the same tiles, each once", sorted(listed(p.layer)), sorted(tiles))
+    s.equal(name + ": every tile has a triangle", [(t.z, t.x, t.y) for t in every if not t.triangles], [])
+    wrong = [(t.z, t.x, t.y, side) for t in every for side, (axis, value) in enumerate(SIDES)
+             if sorted(t.edges[side]) != [i for i, n in enumerate(getattr(t, axis)) if n == value]]
+    s.equal(name + ": the lists of sides are the vertices at 0 and 32767", wrong, [])
+    # One step for all; its ends are floats.
+    heads = {(t.low, t.high) for t in every}
+    step = every[0].step
+    s.check(name + ": all tiles have one range of heights, 32767 steps of a power of two",
+            len(heads) == 1 and math.frexp(step)[0] == 0.5 and step == every[0].metadata["heightStep"], heads)
+    s.check(name + ": what is stated is no more than what clients take the level to be off",
+            all(t.metadata["error"] <= t.metadata["geometricError"] == 77067.339779958624 / 2**t.z for t in every))
+    # Errors, by brute force.
+    worst_vertical = worst_space = 0.0
+    holes = covered = 0
+    for t in every:
+        vertical, space, bare, seen = measure(p, t)
+        worst_vertical, worst_space = max(worst_vertical, vertical), max(worst_space, space)
+        holes, covered = holes + bare, covered + seen
+    s.check(name + ": no sample is further above or below a tile than it states (%d looked at, worst %.3f of it)" % (covered, worst_vertical),
+            covered > 0 and 0 < worst_vertical <= 1, worst_vertical)
+    s.check(name + ": no sample is further from a tile in space, between chords, than it states (worst %.3f)" % worst_space,
+            0 < worst_space <= 1, worst_space)
+    if is_whole:
+        s.equal(name + ": tiles of every level cover the raster", holes, 0)
+    # Neighbours.
+    different = compared = 0
+    for (z, x, y), t in tiles.items():
+        for side, other, theirs in ((2, (z, x + 1, y), 0), (3, (z, x, y + 1), 1)):
+            if other in tiles:
+                compared += 1
+                different += edge_of(t, side) != edge_of(tiles[other], theirs)
+    s.check(name + ": shared edges decode to identical vertices and normals (%d)" % compared, compared > 0 and different == 0, different)
+    # Children: their areas are the parent's but for what the outline moves by, half a unit on either side.
+    finest = max(z for z, _, _ in tiles)
+    lost = []
+    for (z, x, y), t in tiles.items():
+        if z == finest or not is_whole:
+            continue
+        children = [tiles.get((z + 1, 2 * x + i, 2 * y + j)) for i in (0, 1) for j in (0, 1)]
+        whole, parts = t.area() / 2, sum(c.area() / 2 / 4 for c in children if c)
+        if abs(whole - parts) > (0 if whole == UNITS**2 and all(children) else 8 * UNITS):
+            lost.append((z, x, y, whole, parts))
+    s.equal(name + ": children cover their parent", lost, [])
+    if is_whole:
+        full = [t for t in every if t.west >= p.x0 and t.west + t.side <= p.x0 + (len(p.raster[0]) - 1) * p.dx and
+                t.south + t.side <= p.y0 and t.south >= p.y0 + (len(p.raster) - 1) * p.dy]
+        s.equal(name + ": triangles of a tile inside have its area, exactly (%d)" % len(full), [t.area() for t in full if t.area() != 2 * UNITS**2], [])
+    flipped = sum(1 for t in every for a, b, c in t.triangles
+                  if (t.u[b] - t.u[a]) * (t.v[c] - t.v[a]) - (t.u[c] - t.u[a]) * (t.v[b] - t.v[a]) < 0)
+    print("%s: %d tiles, %d vertices, %d of %d triangles turned by rounding" %
+          (name, len(every), sum(t.count for t in every), flipped, sum(len(t.triangles) for t in every)))
+    # Space.
+    s.equal(name + ": spheres hold every vertex",
+            [(t.z, t.x, t.y) for t in every if max(math.dist(t.centre, q) for q in t.xyz) > t.radius], [])
+    some = RANDOM.sample(every, min(len(every), 40))
+    fails = [horizon_fails(t, 50) for t in some]
+    s.check(name + ": what counts as below the horizon is (%d times)" % sum(h for _, h in fails),
+            sum(w for w, _ in fails) == 0 and sum(h for _, h in fails) > 0, fails)
+
+
+def exact_range(p, z):
+    """Tiles that overlap the raster, in rational numbers."""
+    side = Fraction(180, 2**z)
+    x0, x1 = Fraction(p.x0), Fraction(p.x0) + (len(p.raster[0]) - 1) * Fraction(p.dx)
+    y0, y1 = Fraction(p.y0) + (len(p.raster) - 1) * Fraction(p.dy), Fraction(p.y0)
+    near = [math.floor(float((a + b) / side)) for a, b in ((x0, 180), (x1, 180), (y0, 90), (y1, 90))]
+    return {(z, x, y) for x in range(max(0, near[0] - 2), min(2 << z, near[1] + 3)) for y in range(max(0, near[2] - 2), min(1 << z, near[3] + 3))
+            if -180 + x * side < x1 and -180 + (x + 1) * side > x0 and -90 + y * side < y1 and -90 + (y + 1) * side > y0}
+
+
+# ------------------------------------------------------------------------------------------------------------- terrains
+
+def pyramid(name, path, source=None, options=(), **imports):
+    """The tiles of a terrain of this raster, with the heights that its source has."""
+    database = s.temp(name + ".gpkg")
+    s.import_terrain(database, path, name=name, **imports)
+    db = s.connect(database)
+    at = s.rows(db, "SELECT x0, y0, dx, dy FROM rqt_terrain")[0]
+    db.close()
+    return Pyramid(name, database, source or s.read_raster(path), *at, options=options)
+
+
+def window(name, source, *box):
+    path = s.temp(name + ".tif")
+    s.run(["gdal_translate", "-q", "-srcwin", *map(str, box), os.path.join(s.DATA, source), path])
+    return path
+
+
+def listed_exactly(p, is_whole):
+    """Listed iff it has a triangle: by areas in rational numbers; where samples are void, by asking for the triangles."""
+    asked = [(z, x, y) for z in range(len(p.layer["available"])) for _, x, y in sorted(exact_range(p, z))]
+    if is_whole:
+        s.equal(p.name + ": the tiles that overlap the raster are listed", sorted(p.tiles), sorted(asked))
+        return
+    db = s.connect(p.database)
+    options = json.dumps({"outline": "tol", "frame": "ecef"})
+    there = []
+    for z, x, y in asked:
+        side = 180 / 2**z
+        box = -180 + x * side, -90 + y * side, -180 + (x + 1) * side, -90 + (y + 1) * side
+        if s.one(db, "SELECT count(*) FROM rqt_triangles(rqt_bbox(?, ?, ?, ?), ?, NULL, ?)", *box, p.layer["eps"][z], options):
+            there.append((z, x, y))
+    db.close()
+    s.check(p.name + ": the tiles that have a triangle are listed, and no others (%d of %d)" % (len(there), len(asked)),
+            sorted(p.tiles) == sorted(there) and len(there) < len(asked), sorted(set(there) ^ set(p.tiles))[:5])
+
+
+def count_vertices(p):
+    """Vertices of all tiles of a level beside those of exact, cut, at the error that each tile states. That error is in space;
+    how many times as many exact needs for it as in longitude, latitude and height shows in mode cover, which knows both."""
+    db = s.connect(p.database)
+    table = []
+    for z in range(len(p.layer["available"])):
+        mine = theirs = 0
+        for (level, x, y), t in p.tiles.items():
+            if level != z:
+                continue
+            mine += t.count
+            cut, cover, space = (
+                s.one(db, "SELECT count(*) FROM rqt_range(rqt_bbox(?, ?, ?, ?), ?, NULL, ?)", t.west, t.south, t.west + t.side, t.south + t.side,
+                      t.metadata["error"], json.dumps(dict(options, outline="tol")))
+                for options in ({"mode": "cut"}, {}, {"frame": "ecef"}))
+            theirs += cut * max(1, space / cover)
+        table.append((z, mine, theirs))
+    db.close()
+    print(p.name + ": level, vertices, those of exact: " + ", ".join("%d %d %.0f" % row for row in table))
+    s.equal(p.name + ": no level has more than 1.1 times the vertices of exact, cut, at the same error", [r for r in table if r[1] > 1.1 * r[2]], [])
+
+
+def check_normals(p):
+    """At samples of the finest level: by differences of the raster, turned into space here."""
+    finest = max(z for z, _, _ in p.tiles)
+    worst = seen = 0
+    for (z, _, _), t in p.tiles.items():
+        if z != finest:
+            continue
+        for i, (lon, lat, _) in enumerate(t.places):
+            col, row = (lon - p.x0) / p.dx, (lat - p.y0) / p.dy
+            c, r = round(col), round(row)
+            if abs(col - c) > 0.01 or abs(row - r) > 0.01 or not (0 < c < len(p.raster[0]) - 1 and 0 < r < len(p.raster) - 1):
+                continue
+            east, west, north, south = (p.place(c + a, r + b) for a, b in ((1, 0), (-1, 0), (0, -1), (0, 1)))
+            x, y = minus(east, west), minus(north, south)
+            n = (x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0])
+            length = math.sqrt(dot(n, n))
+            worst = max(worst, math.acos(min(1, dot(n, t.normal(i)) / length)))
+            seen += 1
+    s.check("%s: normals are the terrain's, from its full resolution (%d, worst %.2f degrees)" % (p.name, seen, math.degrees(worst)),
+            seen > 100 and math.degrees(worst) < 1, math.degrees(worst))
+
+
+ALPS = pyramid("alps", window("alps", "glarus_1arc_native_161.tif", 30, 40, 85, 73))
+check_pyramid(ALPS, True)
+listed_exactly(ALPS, True)
+count_vertices(ALPS)
+check_normals(ALPS)
+
+AFRICA = pyramid("africa", window("africa", "eastafrica.tif", 40, 60, 90, 110))
+check_pyramid(AFRICA, True)
+listed_exactly(AFRICA, True)
+count_vertices(AFRICA)
+
+# All of the Earth: flat triangles dive under it by kilometres.
+EARTH = pyramid("earth", os.path.join(s.DATA, "etopo1_1deg.tif"), options=["--gzip"])
+check_pyramid(EARTH, True)
+
+# Voids, and none of them the border of anything.
+hole = s.rough_grid(150, 130, 7, relief=300)
+for row in range(130):
+    for col in range(150):
+        if (col - 100) ** 2 + (row - 60) ** 2 > 70**2 or (col - 90) ** 2 + (row - 60) ** 2 < 20**2 or (col * 7919 + row * 104729) % 997 == 0:
+            hole[row][col] = None
+HOLES = pyramid("holes", s.write_grid(s.temp("holes.asc"), hole, 12.3, 45.6, 1 / 1200, s.WGS84), hole)
+check_pyramid(HOLES, False)
+listed_exactly(HOLES, False)
+
+# Longitudes beyond 180: the same places by another name.
+hill = s.rough_grid(90, 70, 11, relief=500)
+NEAR = pyramid("near", s.write_grid(s.temp("near.asc"), hill, -1.5, 50.25, 1 / 64, s.WGS84), hill)
+FAR = pyramid("far", s.write_grid(s.temp("far.asc"), hill, 358.5, 50.25, 1 / 64, s.WGS84), hill)
+s.equal("a terrain at 358.5 degrees has the tiles of one at -1.5", files(FAR.folder + "/3"), files(NEAR.folder + "/3"))
+s.equal("... at every level", sorted(FAR.tiles), sorted(NEAR.tiles))
+ACROSS = pyramid("across", s.write_grid(s.temp("across.asc"), hill, 179.5, 50.25, 1 / 64, s.WGS84), hill)
+s.check("a terrain across the antimeridian has tiles on both ends of a level",
+        {0, 1} == {x for z, x, _ in ACROSS.tiles if z == 0} and ACROSS.layer["bounds"][0] == -180 and ACROSS.layer["bounds"][2] == 180, sorted(ACROSS.tiles)[:4])
+
+# Heights above EGM96 become heights above the ellipsoid, as clients have them.
+geoid = s.temp("geoid.tif")
+s.run(["gdal_translate", "-q", "-a_srs", "EPSG:4326+5773", s.temp("near.asc"), geoid])
+db_path = s.temp("geoid.gpkg")
+s.import_terrain(db_path, geoid, name="geoid")
+
+
+def height_above_ellipsoid(x, y, z):
+    """Bowring, again and again."""
+    flat = math.hypot(x, y)
+    lat = math.atan2(z, flat * (1 - E2))
+    for _ in range(5):
+        n = A / math.sqrt(1 - E2 * math.sin(lat) ** 2)
+        lat = math.atan2(z + E2 * n * math.sin(lat), flat)
+    return flat * math.cos(lat) + z * math.sin(lat) - A * math.sqrt(1 - E2 * math.sin(lat) ** 2)
+
+
+db = s.connect(db_path)
+placed = s.rows(db, "SELECT x0, y0, dx, dy FROM rqt_terrain")[0]
+raised = [[None] * 90 for _ in range(70)]
+both = s.rows(db, "SELECT x, y, z FROM rqt_range(NULL, 0, NULL, '{\"frame\": \"ecef\"}')")
+for x, y, z in both:
+    lon, lat = math.degrees(math.atan2(y, x)), math.degrees(math.atan2(z, math.hypot(x, y) * (1 - E2)))
+    raised[round((lat - placed[1]) / placed[3])][round((lon - placed[0]) / placed[2])] = height_above_ellipsoid(x, y, z)
+db.close()
+s.check("every sample of the rough terrain is a vertex of its finest mesh", all(z is not None for row in raised for z in row))
+GEOID = Pyramid("geoid", db_path, raised, *placed)
+check_pyramid(GEOID, True)
+s.check("heights are lifted by the geoid, which lies some 50 m above the ellipsoid there",
+        all(30 < raised[r][c] - hill[r][c] < 60 for r in range(70) for c in range(90)))
+
+# --------------------------------------------------------------------------------------------------------------- water
+
+sea = s.rough_grid(140, 120, 3, relief=200)
+for row in range(120):
+    for col in range(140):
+        if math.hypot(col - 10, row - 20) > 52 + 8 * math.sin(row / 5) or (col - 20) ** 2 + (row - 30) ** 2 < 30:
+            sea[row][col] = None
+COAST = pyramid("coast", s.write_grid(s.temp("coast.asc"), sea, 5.01, 43.02, 1 / 1200, s.WGS84), [[0 if z is None else z for z in row] for row in sea], sea=0)
+check_pyramid(COAST, True)
+wrong, sizes = [], set()
+for key, t in COAST.tiles.items():
+    mask = t.extensions[2]
+    sizes.add((len(mask), max(mask)))
+    for n in range(0, 65536, 37):
+        lon, lat = t.west + (n % 256 + 0.5) / 256 * t.side, t.south + t.side - (n // 256 + 0.5) / 256 * t.side
+        col, row = math.floor((lon - COAST.x0) / COAST.dx + 0.5), math.floor((lat - COAST.y0) / COAST.dy + 0.5)
+        is_sea = 0 <= col < 140 and 0 <= row < 120 and sea[row][col] is None
+        if mask[n if len(mask) > 1 else 0] != (255 if is_sea else 0):
+            wrong.append((key, n))
+s.equal("the water mask is the sea, north-west first", wrong[:3], [])
+s.check("tiles of land and of water have one byte of it, others 256 x 256", sizes == {(1, 0), (1, 255), (65536, 255)}, sizes)
+s.equal("layer.json has the extensions that tiles have", (COAST.layer["extensions"], ALPS.layer["extensions"], set(ALPS.tiles[0, 1, 0].extensions)),
+        (["octvertexnormals", "metadata", "watermask"], ["octvertexnormals", "metadata"], {1, 4}))
+
+# ------------------------------------------------------------------------------------------------------------ to disk
+
+whole = files(COAST.folder)
+again = s.temp("again")
+command = [s.RQT, "tiles", COAST.database, "-o", again]
+process = subprocess.Popen(command + ["--jobs", "1"])
+while process.poll() is None and sum(len(names) for _, _, names in os.walk(again)) < 12:
+    time.sleep(0.001)
+process.send_signal(signal.SIGKILL)
+process.wait()
+killed = {path: data for path, data in files(again).items() if path.endswith(".terrain")}
+s.check("killed, it leaves whole tiles and no layer.json (%d of %d)" % (len(killed), len(whole)),
+        0 < len(killed) < len(whole) - 2 and all(whole[path] == data for path, data in killed.items()) and not os.path.exists(again + "/layer.json"),
+        len(killed))
+kept = sorted(killed)[0]
+before = os.stat(os.path.join(again, kept)).st_ino
+s.equal("the same command goes on there", s.run(command + ["--jobs", "2"]), ("", 0))
+s.equal("... and the folder is that of one that was not killed, byte for byte", files(again), whole)
+s.equal("... without making again what was there", os.stat(os.path.join(again, kept)).st_ino, before)
+out, status = s.run([s.RQT, "tiles", ALPS.database, "-o", again])
+s.check("tiles of another terrain are not mixed in", status == 1 and "holds tiles of another terrain" in out, out)
+out, status = s.run(command + ["--gzip"])
+s.check("... nor compressed ones", status == 1 and "holds tiles of another terrain" in out, out)
+packed = s.temp("packed")
+s.equal("--gzip", s.run([s.RQT, "tiles", COAST.database, "-o", packed, "--gzip", "--levels", "3-9"]), ("", 0))
+s.equal("... has the same tiles, compressed", {path: gzip.decompress(data) for path, data in files(packed).items() if path.endswith(".terrain")},
+        {path: data for path, data in whole.items() if path.endswith(".terrain") and 3 <= int(path.split("/")[0]) <= 9})
+with open(packed + "/layer.json", encoding="utf-8") as f:
+    some = json.load(f)
+s.equal("... and a layer.json of the levels asked for", (some["minzoom"], some["maxzoom"], some["available"][2], some["available"][3:10]),
+        (3, 9, [], COAST.layer["available"][3:10]))
+flat = s.temp("flat.gpkg")
+s.import_terrain(flat, s.write_grid(s.temp("flat.asc"), s.rough_grid(9, 9, 1)), name="flat")
+for arguments, sentence, expected in (
+        ([flat, "-o", s.temp("none")], "terrain flat has no tiles: they are of terrains in longitude and latitude on WGS 84", 1),
+        ([COAST.database], "-o FOLDER is missing", 2),
+        ([COAST.database, "-o", s.temp("none"), "--levels", "9-3"], "--levels 9-3: two levels", 2),
+        ([COAST.database, "-o", s.temp("none"), "--levels", "24"], "terrain coast has levels 0 to 12", 1),
+        ([COAST.database, "-o", s.temp("none"), "--terrain", "nowhere"], "nowhere", 1),
+        ([COAST.database, "-o", COAST.database], "Not a directory", 1)):
+    out, status = s.run([s.RQT, "tiles", *arguments])
+    s.check("rqt tiles %s: %s" % (" ".join(os.path.basename(a) for a in arguments), sentence), sentence in out and status == expected, out)
+
+# --------------------------------------------------------------------------------------------------------- the service
+
+server = service.Service(COAST.database, flat)
+root = "/collections/coast/tiles/quantized-mesh/"
+answer = server.ask(root + "layer.json")
+s.equal("the service's layer.json is the command's", (answer.content_type, answer.body), ("application/json", whole["layer.json"]))
+s.equal("every tile that is listed is served, with the bytes of the command",
+        [key for key in listed(COAST.layer) if server.ask(root + "%d/%d/%d.terrain" % key).body != whole["%d/%d/%d.terrain" % key]], [])
+key = max(COAST.tiles)
+answer = server.ask(root + "%d/%d/%d.terrain" % key, headers={
+    "Accept": "application/vnd.quantized-mesh;extensions=octvertexnormals-watermask-metadata,application/octet-stream;q=0.9,*/*;q=0.01",
+    "Accept-Encoding": "gzip"})
+s.equal("... as clients ask for it", (answer.status, answer.content_type, answer.content_encoding, gzip.decompress(answer.body)),
+        (200, "application/vnd.quantized-mesh", "gzip", whole["%d/%d/%d.terrain" % key]))
+s.equal("... and not again when they have it", server.ask(root + "%d/%d/%d.terrain" % key, headers={"Accept-Encoding": "gzip", "If-None-Match": answer.etag}).status, 304)
+around = {(z, x + i, y + j) for z, x, y in COAST.tiles for i in (-1, 0, 1) for j in (-1, 0, 1)} - set(COAST.tiles)
+s.equal("tiles that are not listed are not there",
+        [t for t in sorted(around) if min(t) >= 0 and server.ask(root + "%d/%d/%d.terrain" % t).status != 404], [])
+for path in ("13/0/0.terrain", "99999999/0/0.terrain", "0/2/0.terrain", "0/0/1.terrain", "012/0/0.terrain", "0/0/0", "0/0/.terrain", "0/0/0.terrain.terrain",
+             "-1/0/0.terrain", "0/0/0x.terrain", "999999999999/0/0.terrain", "0/0/0.terrain/0", "", "12"):
+    s.equal("no tile at " + path, server.ask(root + path).status, 404)
+answer = server.ask("/collections/flat/tiles/quantized-mesh/layer.json")
+s.check("a terrain without tiles says why", answer.status == 400 and "longitude and latitude on WGS 84" in answer.detail(), answer.detail())
+s.equal("the service lives", (server.is_alive(), server.ask("/healthz").status), (True, 200))
+server.process.terminate()
+s.equal("... and ends well", server.process.wait(30), 0)
+
+s.finish()
