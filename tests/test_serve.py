@@ -240,6 +240,9 @@ for path, item in sorted(api["paths"].items()):
     needed = {name: p["example"] if isinstance(p["example"], (str, int, float)) else ",".join(map(str, p["example"]))
               for name, p in named.items() if p["required"]}
     whole = path.replace("{terrain}", "hills")
+    for p in parameters_of(item["get"]):
+        if p["in"] == "path" and p["name"] != "terrain":
+            whole = whole.replace("{%s}" % p["name"], str(p["example"]))
     answer = ask(whole, dict(needed, bbox=BOX) if "bbox" in named else needed)
     equal("OpenAPI: %s answers its examples" % path, answer.status, 200)
     kinds = item["get"]["responses"]["200"]["content"]
@@ -361,7 +364,7 @@ for path, status, sentence in (
         ("/collections/nobody", 404, "there is no terrain of this name"),
         ("/collections/nobody/range?eps=1", 404, "there is no terrain of this name"),
         ("/collections/hills/range/more", 404, "there is nothing at this path"),
-        ("/collections/hills/a/b/c/d", 404, "so many parts"),
+        ("/collections/hills/a/b/c/d/e/f/g", 404, "so many parts"),
         ("/collections/main.hills", 404, "there is no terrain of this name"),
         ("//collections", 404, "there is nothing at this path"),
         (HILLS + "/range", 400, "the parameter eps of /collections/{terrain}/range is missing"),

@@ -1,0 +1,50 @@
+"""Mutants of the tiles: see ../mutants.py."""
+
+TILES = "test_tiles.py"
+PLAN, MESH, GLOBE, WATER, ENCODE, LAYER, PYRAMID = ("src/tiles/%s.c" % name for name in ("plan", "mesh", "globe", "water", "encode", "layer", "pyramid"))
+
+MUTANTS = [
+    # errors
+    ("tiles: the mesh is too coarse", PLAN, "rqt_rule_set_eps(t->plan->rule, t->plan->level[z].eps)", "rqt_rule_set_eps(t->plan->rule, 2 * t->plan->level[z].eps)", TILES,
+     "no sample is further above or below"),
+    ("tiles: curvature takes nothing", PLAN, "if (status == RQT_OK) status = rqt_rule_set_lowering(plan->rule, lowering);", "", TILES, "africa: no sample is further from a tile in space"),
+    ("tiles: vertices do not move", MESH, "mesh->error = eps + moved * (1 + 1e-9) + 1e-7;", "mesh->error = eps + 0 * moved;", TILES, "no sample is further from a tile in space"),
+    ("tiles: slopes do not count", MESH, "eps + mesh->move[2] + sloping * (1 + 1e-9) + 1e-7;", "eps + mesh->move[2] + 0 * sloping;", TILES, "no sample is further above or below"),
+    ("tiles: quantisation takes no part of a level's error", PLAN, "level->eps = level->geometric_error - move;", "level->eps = level->geometric_error;", TILES,
+     "no more than what clients take"),
+    ("tiles: the last level is finer than need be", PLAN, "#define LAST_EPS 0.625", "#define LAST_EPS 0.5", TILES, "1.1 times the vertices"),
+    # neighbours
+    ("tiles: heights begin at each tile's own", ENCODE, "put_float(w, (float)plan->lowest);", "put_float(w, (float)globe->centre[0]);", TILES, "one range of heights"),
+    ("tiles: steps of any size", PLAN, "plan->step = ldexp(1, FIRST_STEP);", "plan->step = 0.001;", TILES, "32767 steps of a power of two"),
+    ("tiles: sides are rounded as the rest is", MESH, "if (fabs(at - high) < ON_SIDE) return TILE_UNITS;", "", TILES, "shared edges decode to identical"),
+    ("tiles: what is near a side is on it", MESH, "n < 1 ? 1 : n > TILE_UNITS - 1 ? TILE_UNITS - 1 : n", "n < 20 ? 0 : n > TILE_UNITS - 20 ? TILE_UNITS : n", TILES, "cover"),
+    ("tiles: v grows south", MESH, "quantise(v->row, turn->south, turn->north, turn->cut[3], turn->cut[2])", "quantise(v->row, turn->north, turn->south, turn->cut[2], turn->cut[3])", TILES,
+     "no sample is further above or below"),
+    ("tiles: the north side is not listed", MESH, "const uint16_t there = side == WEST || side == SOUTH ? 0 : TILE_UNITS;", "const uint16_t there = side == WEST || side == SOUTH ? 0 : TILE_UNITS - (side == NORTH);",
+     TILES, "lists of sides"),
+    # space
+    ("tiles: the sphere is a hair too small", GLOBE, "globe->radius = sqrt(most) * (1 + 1e-9) + 1e-6;", "globe->radius = sqrt(most) * (1 - 1e-7);", TILES, "spheres hold every vertex"),
+    ("tiles: heights do not rise over the horizon", GLOBE, "(along - across * sqrt(m2 - 1)) / sqrt(m2)", "along", TILES, "below the horizon"),
+    ("tiles: the horizon's point is the centre", GLOBE, "if (exists && 1 / cosine > most) most = 1 / cosine;", "most = 1;", TILES, "below the horizon"),
+    ("tiles: normals are not turned into space", GLOBE, "turn(&globe->angles[i], enu, n);", "memcpy(n, enu, sizeof n);", TILES, "normals are the terrain's"),
+    ("tiles: normals of a side are one sample's", GLOBE, "if (weight <= 0) continue;", "if (weight <= 0 || a.count > 0) continue;", TILES, "shared edges decode to identical"),
+    ("tiles: heights are the geoid's", PLAN, "    if (is_above_geoid)\n        plan->geoid = frame;\n    else\n        geo_frame_free(frame);", "    geo_frame_free(frame);", TILES, "geoid: no sample"),
+    # bytes
+    ("tiles: indices are as they come", MESH, "if (code == SQLITE_OK) code = number_by_use(&mesh->cut);", "", TILES, "as the format has it"),
+    ("tiles: an extension has another length", ENCODE, "put_number(w, size + 4, 4);", "put_number(w, size, 4);", TILES, "as the format has it"),
+    ("tiles: the water mask begins in the south", WATER, "mask + j * WATER_SIDE", "mask + (WATER_SIDE - 1 - j) * WATER_SIDE", TILES, "the water mask is the sea"),
+    ("tiles: water masks are whole", WATER, "== 0 ? 1 :", "== 0 ? WATER_SIDE * WATER_SIDE :", TILES, "one byte of it"),
+    # which there are
+    ("tiles: rows are counted from the north", LAYER, 'cJSON_AddNumberToObject(range, "startY", ranges[i].y0);', 'cJSON_AddNumberToObject(range, "startY", (1 << z) - 1 - ranges[i].y0);', TILES, "the same tiles"),
+    ("tiles: tiles of voids are listed", LAYER, "*is_there = code == SQLITE_TOOBIG || patch.triangle_count > 0;", "*is_there = true;", TILES, "the same tiles"),
+    ("tiles: longitudes count once", PLAN, "*last = (int)ceil((e.east + 180) / 360);", "*last = 0;", TILES, "358.5"),
+    ("tiles: a tile that touches the raster is listed", PLAN, "return (from > 0 ? from : 0) < (to < last ? to : last);", "return (from > 0 ? from : 0) <= (to < last ? to : last) + (1 << UNIT_BITS);", TILES,
+     "the same tiles"),
+    # to disk
+    ("tiles: all is made again", PYRAMID, "if (stat(path, &there) == 0) return SQLITE_OK;", "(void)there;", TILES, "without making again"),
+    ("tiles: anybody's folder will do", PYRAMID, "if ((size_t)n == size && memcmp(there, description, size) == 0) return SQLITE_OK;", "return SQLITE_OK;", TILES, "are not mixed in"),
+    ("tiles: gzip is not asked for", PYRAMID, "if (p->job->gzip) code = pack(&tile);", "", TILES, "compressed"),
+    ("tiles: numbers of paths may begin with 0", "src/serve/endpoints.c", "|| (digits > 1 && *segment == '0')", "", TILES, "no tile at 012"),
+    ("tiles: what is behind a number does not matter", "src/serve/endpoints.c", "return strlen(segment + digits) == rest && memcmp(segment + digits, close + 1, rest) == 0;", "return rest + 1 > 0;", TILES,
+     "no tile at 0/0/0x"),
+]
