@@ -269,7 +269,7 @@ check-docs: ## fail when ext/SQL.md, the README's session or the list of fuzzers
 	@./tests/check_fuzz.sh
 
 # ---------------------------------------------------------------------------------------------------- benches
-.PHONY: bench bench-data bench-update bench-table1 bench-serve bench-views chart chart-views peers
+.PHONY: bench bench-data bench-update bench-table1 bench-serve bench-tiles bench-views chart chart-views peers
 bench: ## speed and size beside GDAL's, medians of five and more
 	@./src/install-packages.sh build test
 	@$(MAKE) --no-print-directory -j2 products
@@ -292,6 +292,10 @@ bench-serve: ## the query service under wrk, beside nginx that sends the same by
 	@./src/install-packages.sh build bench
 	@$(MAKE) --no-print-directory -j2 products
 	@BUILD=$(BUILD) ./tests/bench/bench_serve.sh
+bench-tiles: ## tiles for globes: a pyramid of 4097 x 4097 written, and tiles asked of the service
+	@./src/install-packages.sh build test
+	@$(MAKE) --no-print-directory -j2 products
+	@RQT=$(BUILD)/rqt RQT_SO=$(BUILD)/rqt.so /usr/bin/python3 tests/bench/bench_tiles.py
 bench-views: ## what views cost: one megapixel, fly-overs, ETOPO5 over a network, beside the papers' figures
 	@./src/install-packages.sh build test
 	@./src/install-packages.sh views || echo "No ETOPO5: the table goes without" >&2

@@ -83,8 +83,8 @@ bool plan_place(const tiles *t, int z, int32_t x, int32_t y, tile_place *place);
 int plan_ranges(const tiles *t, int z, tile_range ranges[MOST_TURNS]);
 /* The place's rectangle as a region. */
 int plan_region(const tiles *t, const tile_place *place, rqt_region **region);
-/* Sets the rule; the options of every query of this level. */
-int plan_options(const tiles *t, int z, store_query_options *options);
+/* The options of every query. */
+store_query_options plan_options(const tiles *t);
 
 typedef struct tile_mesh {
     rqt_cut cut;         /* vertices in samples */

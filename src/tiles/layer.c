@@ -37,14 +37,13 @@ static int add_range(range_list *list, tile_range range) {
 static int probe(tiles *t, int z, int32_t x, int32_t y, bool *is_there, char **error) {
     store_limits *limits = store_limits_of(t->store);
     const int64_t before = limits->triangles;
-    store_query_options options;
+    const store_query_options options = plan_options(t);
     rqt_region *region = NULL;
     rqt_patch patch = {0};
     tile_place place;
     *is_there = false;
     if (!plan_place(t, z, x, y, &place) || place.turns == 0) return SQLITE_OK;
-    int code = plan_options(t, z, &options);
-    if (code == SQLITE_OK) code = plan_region(t, &place, &region);
+    int code = plan_region(t, &place, &region);
     if (code == SQLITE_OK) {
         limits->triangles = 1; /* more is not looked for */
         code = store_query(t->store, t->terrain, region, t->plan->level[z].eps, &options, &patch, NULL, error);

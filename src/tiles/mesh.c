@@ -189,11 +189,10 @@ static int list_side(tile_mesh *mesh, int side) {
 /* -------------------------------------------------------------------------------------------------- whole -- */
 
 static int cut_patch(tiles *t, const tile_place *place, rqt_patch *patch, tile_mesh *mesh, char **error) {
-    store_query_options options;
+    const store_query_options options = plan_options(t);
     rqt_region *region = NULL;
     waiting w = {t->store, SQLITE_INTERRUPT};
-    int code = plan_options(t, place->z, &options);
-    if (code == SQLITE_OK) code = plan_region(t, place, &region);
+    int code = plan_region(t, place, &region);
     if (code == SQLITE_OK)
         code =
             store_query(t->store, t->terrain, region, t->plan->level[place->z].eps, &options, patch, NULL, error);

@@ -166,13 +166,12 @@ void plan_free(tile_plan *plan) {
     sqlite3_free(plan);
 }
 
-int plan_options(const tiles *t, int z, store_query_options *options) {
-    *options = (store_query_options){.select = RQT_SELECT_THRESHOLD,
-                                     .outline = RQT_OUTLINE_TOL,
-                                     .metric = RQT_METRIC_EXACT,
-                                     .product = RQT_PRODUCT_TRIANGLES,
-                                     .rule = t->plan->rule};
-    return rqt_rule_set_eps(t->plan->rule, t->plan->level[z].eps) == RQT_OK ? SQLITE_OK : SQLITE_NOMEM;
+store_query_options plan_options(const tiles *t) {
+    return (store_query_options){.select = RQT_SELECT_THRESHOLD,
+                                 .outline = RQT_OUTLINE_TOL,
+                                 .metric = RQT_METRIC_EXACT,
+                                 .product = RQT_PRODUCT_TRIANGLES,
+                                 .rule = t->plan->rule};
 }
 
 /* ------------------------------------------------------------------------------------------------- places -- */

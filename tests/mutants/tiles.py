@@ -5,7 +5,7 @@ PLAN, MESH, GLOBE, WATER, ENCODE, LAYER, PYRAMID = ("src/tiles/%s.c" % name for 
 
 MUTANTS = [
     # errors
-    ("tiles: the mesh is too coarse", PLAN, "rqt_rule_set_eps(t->plan->rule, t->plan->level[z].eps)", "rqt_rule_set_eps(t->plan->rule, 2 * t->plan->level[z].eps)", TILES,
+    ("tiles: the mesh is too coarse", MESH, "store_query(t->store, t->terrain, region, t->plan->level", "store_query(t->store, t->terrain, region, 1.5 * t->plan->level", TILES,
      "no sample is further above or below"),
     ("tiles: curvature takes nothing", PLAN, "if (status == RQT_OK) status = rqt_rule_set_lowering(plan->rule, lowering);", "", TILES, "africa: no sample is further from a tile in space"),
     ("tiles: vertices do not move", MESH, "mesh->error = eps + moved * (1 + 1e-9) + 1e-7;", "mesh->error = eps + 0 * moved;", TILES, "no sample is further from a tile in space"),
