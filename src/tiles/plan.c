@@ -299,7 +299,7 @@ int plan_region(const tiles *t, const tile_place *place, rqt_region **region) {
         end += sprintf(end, "%s((%.17g %.17g,%.17g %.17g,%.17g %.17g,%.17g %.17g,%.17g %.17g))", i ? "," : "",
                        box[0], box[2], box[1], box[2], box[1], box[3], box[0], box[3], box[0], box[2]);
     }
-    strcpy(end, ")");
+    sprintf(end, ")");
     rqt_status status = rqt_geometry_parse(text, strlen(text), true, store_allocator(), &geometry, &why);
     if (status == RQT_OK)
         status = rqt_region_create(geometry, &as_it_is, &t->terrain->lattice, store_allocator(), region);

@@ -21,7 +21,7 @@ static int read_runs(sqlite3_stmt *rows, const store_terrain *terrain, tile_plan
             run.row >= terrain->lattice.height ||
             (before && (run.row < before->row || (run.row == before->row && run.first <= before->last))))
             return tiles_fail(error, "terrain %s is damaged: its filled samples; see rqt check", terrain->name);
-        if (plan->sea_count == capacity) {
+        if (!plan->sea || plan->sea_count == capacity) {
             capacity = capacity ? 2 * capacity : 256;
             sea_run *more = sqlite3_realloc64(plan->sea, capacity * sizeof *more);
             if (!more) return SQLITE_NOMEM;

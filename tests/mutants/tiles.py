@@ -27,7 +27,7 @@ MUTANTS = [
     ("tiles: heights do not rise over the horizon", GLOBE, "(along - across * sqrt(m2 - 1)) / sqrt(m2)", "along", TILES, "below the horizon"),
     ("tiles: the horizon's point is the centre", GLOBE, "if (exists && 1 / cosine > most) most = 1 / cosine;", "most = 1;", TILES, "below the horizon"),
     ("tiles: normals are not turned into space", GLOBE, "turn(&globe->angles[i], enu, n);", "memcpy(n, enu, sizeof n);", TILES, "normals are the terrain's"),
-    ("tiles: normals of a side are one sample's", GLOBE, "if (weight <= 0) continue;", "if (weight <= 0 || a.count > 0) continue;", TILES, "shared edges decode to identical"),
+    ("tiles: normals of a side are one sample's", GLOBE, "if (weight <= 0) continue;", "if (weight <= 0 || a.count > 0) continue;", TILES, "the mean of those around"),
     ("tiles: heights are the geoid's", PLAN, "    if (is_above_geoid)\n        plan->geoid = frame;\n    else\n        geo_frame_free(frame);", "    geo_frame_free(frame);", TILES, "geoid: no sample"),
     # bytes
     ("tiles: indices are as they come", MESH, "if (code == SQLITE_OK) code = number_by_use(&mesh->cut);", "", TILES, "as the format has it"),
