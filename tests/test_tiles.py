@@ -10,6 +10,7 @@ import json
 import math
 import os
 import random
+import shutil
 import signal
 import struct
 import subprocess
@@ -604,6 +605,18 @@ for arguments, sentence, expected in (
         ([COAST.database, "-o", COAST.database], "Not a directory", 1)):
     out, status = s.run([s.RQT, "tiles", *arguments])
     s.check("rqt tiles %s: %s" % (" ".join(os.path.basename(a) for a in arguments), sentence), sentence in out and status == expected, out)
+
+# A database that somebody has edited.
+for name, edit, sentence in (("fill", "UPDATE rqt_fill_1 SET row = 100000 WHERE id = (SELECT max(id) FROM rqt_fill_1)", "terrain coast is damaged: its filled samples"),
+                             ("block", "UPDATE rqt_block_1 SET data = zeroblob(length(data))", "damaged")):
+    edited = s.temp(name + ".edited.gpkg")
+    shutil.copy(COAST.database, edited)
+    db = s.connect(edited)
+    db.execute(edit)
+    db.close()
+    folder = s.temp(name + ".edited")
+    out, status = s.run([s.RQT, "tiles", edited, "-o", folder])
+    s.check("F55_an_edited_%s_is_a_sentence_and_no_layer_json" % name, status == 1 and sentence in out and not os.path.exists(folder + "/layer.json"), out)
 
 # --------------------------------------------------------------------------------------------------------- the service
 
