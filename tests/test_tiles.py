@@ -150,6 +150,9 @@ class Pyramid:
         with open(os.path.join(self.folder, "layer.json"), encoding="utf-8") as f:
             self.layer = json.load(f)
         self.tiles = {}
+        if "--gzip" in options:
+            if not s.equal(name + ": all tiles are compressed", {data[:2] for path, data in files(self.folder).items() if path.endswith(".terrain")}, {b"\x1f\x8b"}):
+                s.finish()
         for path, data in files(self.folder).items():
             if path.endswith(".terrain"):
                 z, x, y = map(int, path[:-len(".terrain")].split("/"))
@@ -636,9 +639,10 @@ s.equal("... and not again when they have it", server.ask(root + "%d/%d/%d.terra
 around = {(z, x + i, y + j) for z, x, y in COAST.tiles for i in (-1, 0, 1) for j in (-1, 0, 1)} - set(COAST.tiles)
 s.equal("tiles that are not listed are not there",
         [t for t in sorted(around) if min(t) >= 0 and server.ask(root + "%d/%d/%d.terrain" % t).status != 404], [])
-for path in ("13/0/0.terrain", "99999999/0/0.terrain", "0/2/0.terrain", "0/0/1.terrain", "012/0/0.terrain", "0/0/0", "0/0/.terrain", "0/0/0.terrain.terrain",
-             "-1/0/0.terrain", "0/0/0x.terrain", "999999999999/0/0.terrain", "0/0/0.terrain/0", "", "12"):
+for path in ("13/0/0.terrain", "99999999/1/0.terrain", "0/2/0.terrain", "0/1/1.terrain", "00/1/0.terrain", "0/01/0.terrain", "0/1/0", "0/1/.terrain",
+             "0/1/0.terrain.terrain", "-0/1/0.terrain", "0/1/0x.terrain", "999999999999/1/0.terrain", "0/1/0.terrain/0", "", "0"):
     s.equal("no tile at " + path, server.ask(root + path).status, 404)
+s.equal("... but at 0/1/0.terrain", server.ask(root + "0/1/0.terrain").status, 200)
 answer = server.ask("/collections/flat/tiles/quantized-mesh/layer.json")
 s.check("a terrain without tiles says why", answer.status == 400 and "longitude and latitude on WGS 84" in answer.detail(), answer.detail())
 s.equal("the service lives", (server.is_alive(), server.ask("/healthz").status), (True, 200))
