@@ -6,8 +6,8 @@
  *
  * Levels. The last is the first whose pixels are no wider than samples, where the terrain is nearest to the equator
  * and they are widest. A level's pixels are drawn from a mesh with vertices 2^shift samples apart, the most that is
- * no more than a pixel (of a pixel that is not square in samples, the square of its area): so what a tile takes does
- * not grow with the terrain, and a tile of the last levels is drawn from all samples.
+ * no more than a pixel (of a pixel that is not square in samples, the square of its area): so what a tile takes
+ * does not grow with the terrain, and a tile of the last levels is drawn from all samples.
  *
  * Heights are told in steps of a thousandth of a pixel's width, a power of two between 1/256 m and 1 m: finer ones
  * would be noise, of which half of a tile's bytes would be. The error that is told has them in it.
@@ -175,9 +175,10 @@ static int document(tiles *t, const char *root, int first, int last, tile_bytes 
     /* For people: what pixels are, and what is told of them. */
     cJSON_AddStringToObject(json, "heights", t->terrain->vertical[0] ? t->terrain->vertical : "as in the source");
     cJSON_AddItemToObject(json, "steps", cJSON_CreateDoubleArray(plan_of_pixels(t)->step, last + 1));
-    cJSON_AddStringToObject(json, "error",
-                            "in each tile (PNG text error_metres): no sample whose four pixels around are not 0 m is "
-                            "further from their bilinear interpolation");
+    cJSON_AddStringToObject(
+        json, "error",
+        "in each tile (PNG text error_metres): no sample whose four pixels around are not 0 m is "
+        "further from their bilinear interpolation");
     cJSON_AddStringToObject(json, "void", "0 m (128, 0, 0), as nothing else is");
     sqlite3_free(address);
     return tiles_print(json, out);

@@ -15,7 +15,7 @@ enum { PIXELS = 256, GRID = PIXELS + 2 };
 
 typedef struct terrarium_plan {
     int finest;
-    int shift[TILES_LEVELS]; /* the mesh of a level has vertices 2^shift samples apart, at least */
+    int shift[TILES_LEVELS];   /* the mesh of a level has vertices 2^shift samples apart, at least */
     double step[TILES_LEVELS]; /* metres between heights that are told apart: a power of two, 1/256 .. 1 */
     tile_range ranges[TILES_LEVELS][MOST_TURNS];
     int range_count[TILES_LEVELS];
@@ -30,11 +30,11 @@ typedef struct pixel_grid {
     const store_terrain *terrain;
     int z;
     double step;
-    double lon[GRID], lat[GRID]; /* of pixels' centres, degrees; longitudes as they come, from below -180 on */
-    double col[GRID], row[GRID]; /* the same in samples, on the turn that is at hand: both grow */
+    double lon[GRID], lat[GRID];   /* of pixels' centres, degrees; longitudes as they come, from below -180 on */
+    double col[GRID], row[GRID];   /* the same in samples, on the turn that is at hand: both grow */
     double per_col, per_row[GRID]; /* 1 / distance to the next pixel; per_row[GRID - 1] is not used */
     int32_t code[GRID * GRID];
-    double height[GRID * GRID]; /* what clients make of the code, metres */
+    double height[GRID * GRID];    /* what clients make of the code, metres */
     uint8_t is_whole[GRID * GRID]; /* are the pixel, the ones right of it, below and both of terrain? */
     double error; /* no sample between four pixels of terrain is further from what is drawn: metres */
 } pixel_grid;

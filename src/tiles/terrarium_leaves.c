@@ -1,27 +1,34 @@
-/* terrarium_leaves.c - pixels of the levels that have pixels larger than samples: on a mesh whose vertices are about
- * as far apart as pixels, and a proof of how far every sample is from what is drawn, without looking at samples.
+/* terrarium_leaves.c - pixels of the levels that have pixels larger than samples: on a mesh whose vertices are
+ * about as far apart as pixels, and a proof of how far every sample is from what is drawn, without looking at
+ * samples.
  *
- * The mesh. Blocks of one level of the pyramid tile the terrain. Each, of stride s, keeps the vertices of its lattice
- * whose error is above its em, and those of the outline, which with its corners are a closed set; no vertex finer
- * than s has an error above em. So a leaf of that set in the block's cell, with three valid corners, has each of its
- * valid samples within em of its plane. Which mesh that is depends on the place alone. (Two blocks need not agree
- * on what they have in common, for their em differ; each is within its own.)
+ * The mesh. Blocks of one level of the pyramid tile the terrain. Each, of stride s, keeps the vertices of its
+ * lattice whose error is above its em, and those of the outline, which with its corners are a closed set; no vertex
+ * finer than s has an error above em. So a leaf of that set in the block's cell, with three valid corners, has each
+ * of its valid samples within em of its plane. Which mesh that is depends on the place alone. (Two blocks need not
+ * agree on what they have in common, for their em differ; each is within its own.)
  *
  * The proof. Let B be what clients draw. A sample in the leaf T is at most em + sup over T of |plane(T) - B| from
  * it. Instead of B we look at B', which has the same pixels and is bilinear between them in longitude and latitude:
  * on a strip between two rows of pixels the share of the lower row differs by at most
  *
- *     h^2 max|M''| / (8 (M1 - M0)),       M the Mercator ordinate, M'' = sin(phi) / cos(phi)^2, h the strip's height
+ *     h^2 max|M''| / (8 (M1 - M0)),       M the Mercator ordinate, M'' = sin(phi) / cos(phi)^2, h the strip's
+ * height
  *
  * which, times what the two rows differ by, is `bent`. On what a leaf has in common with a cell of four pixels,
- * plane - B' is k u v + linear in the cell's own u, v: a saddle, without extremes inside. So its extremes lie on the
- * border. On sides that run along u or v it is linear, so that they are at ends: at corners of the leaf, at places
- * where sides of the leaf cross lines of pixels, or at pixels, where the leaf's own height was rounded to the code.
- * On sides that slant it is a parabola, at most |k du dv| / 4 from the chord. So it is enough to walk along the sides
- * of leaves from line to line.
+ * plane - B' is k u v + linear in the cell's own u, v: a saddle, without extremes inside. So its extremes lie on
+ * the border. On sides that run along u or v it is linear, so that they are at ends: at corners of the leaf, at
+ * places where sides of the leaf cross lines of pixels, or at pixels, where the leaf's own height was rounded to
+ * the code. On sides that slant it is a parabola, at most |k du dv| / 4 from the chord. So it is enough to walk
+ * along the sides of leaves from line to line.
  *
- * Voids. Samples in leaves that are not kept are within nothing of anything. So a pixel is void when its square, half
- * a pixel around its centre, meets such a leaf: then no sample in one has four pixels of terrain around it.
+ * em may be as much as all the rest. But it is only the largest sum that counts, and how large it is at least is
+ * known: vertices are samples. So a block whose sum is more than TIGHT times that gives way to its children, whose
+ * em are smaller, down to where there is nothing finer than vertices: branch and bound, as in core/update. Few
+ * blocks do, and when it is noise, and there would be many, we stop after MOST_SPLITS.
+ *
+ * Voids. Samples in leaves that are not kept are within nothing of anything. So a pixel is void when its square,
+ * half a pixel around its centre, meets such a leaf: then no sample in one has four pixels of terrain around it.
  */
 #include "terrarium.h"
 
@@ -40,6 +47,8 @@ typedef struct corner {
     int i, j; /* on the block's lattice */
 } corner;
 
+#define TIGHT 1.2
+enum { MOST_SPLITS = 48 };
 enum { DRAW, MEASURE };
 enum { MOST_SIDE = (1 << RQT_MAX_BLOCK_K) + 1 };
 
@@ -47,11 +56,22 @@ typedef struct walk {
     pixel_grid *g;
     const rqt_block *block;
     int what;
-    size_t n;                            /* vertices of the block's lattice a side */
-    double col[MOST_SIDE], row[MOST_SIDE]; /* of its columns and rows, in samples */
+    size_t n;                                       /* vertices of the block's lattice a side */
+    double col[MOST_SIDE], row[MOST_SIDE];          /* of its columns and rows, in samples */
     int first_col[MOST_SIDE], first_row[MOST_SIDE]; /* the pixels that are at them or next beyond */
-    double worst;                        /* of |plane - B'| so far, for this block */
+    double worst; /* of |plane - B'| so far, for this block; < 0: none of it is between pixels of terrain */
+    double seen;  /* of |sample - B'|, for all */
+    int splits;
+    struct measured *list; /* the blocks that were measured */
+    size_t count, capacity;
 } walk;
+
+/* A block on a turn, and what its samples are off at most. */
+typedef struct measured {
+    rqt_block_number number;
+    int turn;
+    double bound;
+} measured;
 
 /* Extent in columns of what a leaf has between two rows; false: nothing. */
 static bool find_span(const corner leaf[3], double from, double to, double *west, double *east) {
@@ -117,7 +137,8 @@ static void void_leaf(const walk *w, const corner leaf[3]) {
     const box b = box_of(leaf);
     const double half = 0.5 / g->per_col + SLACK;
     for (int j = w->first_row[b.north] > 0 ? w->first_row[b.north] - 1 : 0; j < GRID; j++) {
-        const double up = j > 0 ? g->row[j] - g->row[j - 1] : 0, down = j + 1 < GRID ? g->row[j + 1] - g->row[j] : 0;
+        const double up = j > 0 ? g->row[j] - g->row[j - 1] : 0,
+                     down = j + 1 < GRID ? g->row[j + 1] - g->row[j] : 0;
         /* The middle in Mercator's plane is not the one in latitude: a quarter more. */
         const double from = g->row[j] - 0.625 * up - SLACK, to = g->row[j] + 0.625 * down + SLACK;
         double west, east;
@@ -157,6 +178,7 @@ static void measure_side(walk *w, const corner *a, const corner *b) {
                 fabs((h[0] - h[1] - h[GRID] + h[GRID + 1]) * du * dv) * (next - t) * (next - t) / 4;
             const double off = fmax(fabs(from), fabs(to)) + bulge;
             if (off > w->worst) w->worst = off;
+            if (t == 0 && fabs(from) > w->seen) w->seen = fabs(from);
         }
         if (next >= 1) break;
         if (at_col <= next) i += right;
@@ -192,6 +214,14 @@ static bool has_area(const corner leaf[3]) {
            (leaf[2].col - leaf[0].col) * (leaf[1].row - leaf[0].row);
 }
 
+/* A side that two leaves of the block have is measured with the one that goes along it eastward, or southward. */
+static bool is_ours(const walk *w, const corner *p, const corner *q) {
+    if (q->col > p->col || (q->col == p->col && q->row > p->row) || w->g->terrain->voids > 0) return true;
+    const double *col = w->col, *row = w->row;
+    return (p->col == q->col && (p->col == col[0] || p->col == col[w->n - 1])) ||
+           (p->row == q->row && (p->row == row[0] || p->row == row[w->n - 1]));
+}
+
 static void visit(walk *w, const corner leaf[3]) {
     const bool kept = leaf[0].valid && leaf[1].valid && leaf[2].valid;
     if (!has_area(leaf)) return;
@@ -201,7 +231,10 @@ static void visit(walk *w, const corner leaf[3]) {
         else
             void_leaf(w, leaf);
     } else if (kept) {
-        for (int a = 0; a < 3; a++) measure_side(w, &leaf[a], &leaf[a == 2 ? 0 : a + 1]);
+        for (int a = 0; a < 3; a++) {
+            const corner *p = &leaf[a], *q = &leaf[a == 2 ? 0 : a + 1];
+            if (is_ours(w, p, q)) measure_side(w, p, q);
+        }
     }
 }
 
@@ -222,8 +255,8 @@ static void walk_triangle(walk *w, const corner leaf[3]) {
     visit(w, leaf);
 }
 
-/* Both halves of a block. The diagonal of a cell of the lattice passes through the corner whose coordinates are both
- * odd multiples of its side. */
+/* Both halves of a block. The diagonal of a cell of the lattice passes through the corner whose coordinates are
+ * both odd multiples of its side. */
 static void walk_block(walk *w, const rqt_block_place *p) {
     const int last = (int)w->n - 1;
     const corner nw = corner_at(w, 0, 0), ne = corner_at(w, last, 0), sw = corner_at(w, 0, last),
@@ -253,13 +286,98 @@ static void place_lattice(walk *w, const rqt_block_place *p) {
     }
 }
 
+/* Stride 1: what is between vertices is no sample. */
+static void measure_samples(walk *w) {
+    const pixel_grid *g = w->g;
+    const rqt_unit *unit = &g->terrain->unit;
+    for (size_t y = 0; y < w->n; y++) {
+        const int j = g->row[w->first_row[y] < GRID ? w->first_row[y] : 0] > w->row[y] ? w->first_row[y] - 1
+                                                                                       : w->first_row[y];
+        if (j < 0 || j >= GRID - 1) continue;
+        const double v = (w->row[y] - g->row[j]) * g->per_row[j];
+        for (size_t x = 0; x < w->n; x++) {
+            int i = w->first_col[x];
+            if (i < GRID && g->col[i] > w->col[x]) i--;
+            if (i < 0 || i >= GRID - 1) continue;
+            const size_t at = (size_t)j * GRID + (size_t)i, from = y * w->n + x;
+            if (!g->is_whole[at] || !(w->block->flags[from] & RQT_VALID)) continue;
+            const double u = (w->col[x] - g->col[i]) * g->per_col;
+            const double off = fabs(pixels_between(g, at, u, v) - rqt_unit_metres(unit, w->block->q[from]));
+            if (off > w->worst) w->worst = off;
+        }
+    }
+    if (w->worst > w->seen) w->seen = w->worst;
+}
+
+/* *bound: what the samples of a block are off at most; < 0 where none is between pixels of terrain. */
+static int measure_block(tiles *t, const rqt_block_place *p, rqt_block_number number, walk *w, double *bound,
+                         char **error) {
+    const int code = store_read_block(t->store, t->terrain, number, &w->block, error);
+    if (code != SQLITE_OK) return code;
+    place_lattice(w, p);
+    w->worst = -1;
+    if (p->stride == 1)
+        measure_samples(w);
+    else
+        walk_block(w, p);
+    *bound = w->worst;
+    if (w->worst >= 0 && p->stride > 1)
+        *bound = rqt_code_metres(w->block->floor) + fmax(w->worst, 1.5 * w->g->step);
+    return SQLITE_OK;
+}
+
+/* A bound that is too large gives way to those of the block's children. */
+static int tighten(tiles *t, rqt_block_number number, walk *w, double *bound, char **error) {
+    rqt_block_place p;
+    if (*bound <= TIGHT * w->seen || w->splits >= MOST_SPLITS) return SQLITE_OK;
+    (void)rqt_block_locate(&t->terrain->lattice, t->terrain->k, number, &p);
+    if (p.stride == 1) return SQLITE_OK;
+    double bounds[4] = {-1, -1, -1, -1}, most = -1;
+    rqt_block_number numbers[4];
+    w->splits++;
+    for (int c = 0; c < 4; c++) {
+        rqt_block_place child;
+        numbers[c] = rqt_block_number_of(p.level + 1, 2 * p.i + (c & 1), 2 * p.j + (c >> 1));
+        if (rqt_block_locate(&t->terrain->lattice, t->terrain->k, numbers[c], &child) != RQT_OK) continue;
+        const int code = measure_block(t, &child, numbers[c], w, &bounds[c], error);
+        if (code != SQLITE_OK) return code;
+    }
+    for (int c = 0; c < 4; c++) {
+        const int code = tighten(t, numbers[c], w, &bounds[c], error);
+        if (code != SQLITE_OK) return code;
+        most = fmax(most, bounds[c]);
+    }
+    *bound = fmin(*bound, most);
+    return SQLITE_OK;
+}
+
+static int visit_block(tiles *t, const rqt_block_place *p, rqt_block_number number, int turn, walk *w,
+                       char **error) {
+    if (w->what == DRAW) {
+        const int code = store_read_block(t->store, t->terrain, number, &w->block, error);
+        if (code != SQLITE_OK) return code;
+        place_lattice(w, p);
+        walk_block(w, p);
+        return SQLITE_OK;
+    }
+    if (w->count == w->capacity) {
+        w->capacity = w->capacity ? 2 * w->capacity : 64;
+        measured *list = sqlite3_realloc64(w->list, w->capacity * sizeof *list);
+        if (!list) return SQLITE_NOMEM;
+        w->list = list;
+    }
+    measured *m = &w->list[w->count++];
+    *m = (measured){.number = number, .turn = turn};
+    return measure_block(t, p, number, w, &m->bound, error);
+}
+
 /* All blocks of a level that meet the pixels of the turn. */
-static int walk_blocks(tiles *t, int level, walk *w, char **error) {
+static int walk_blocks(tiles *t, int level, int turn, walk *w, char **error) {
     const rqt_lattice *lattice = &t->terrain->lattice;
     const pixel_grid *g = w->g;
-    const int shift = lattice->K - level;
-    const double side = ldexp(1, shift);
-    const int32_t i0 = (int32_t)floor(fmax(g->col[0] - 1, 0) / side), j0 = (int32_t)floor(fmax(g->row[0] - 1, 0) / side);
+    const double side = ldexp(1, lattice->K - level);
+    const int32_t i0 = (int32_t)floor(fmax(g->col[0] - 1, 0) / side),
+                  j0 = (int32_t)floor(fmax(g->row[0] - 1, 0) / side);
     const int32_t i1 = (int32_t)floor(fmin(g->col[GRID - 1] + 1, lattice->width - 1) / side),
                   j1 = (int32_t)floor(fmin(g->row[GRID - 1] + 1, lattice->height - 1) / side);
     for (int32_t j = j0; j <= j1; j++)
@@ -267,14 +385,8 @@ static int walk_blocks(tiles *t, int level, walk *w, char **error) {
             const rqt_block_number number = rqt_block_number_of(level, i, j);
             rqt_block_place place;
             if (rqt_block_locate(lattice, t->terrain->k, number, &place) != RQT_OK) continue;
-            const int code = store_read_block(t->store, t->terrain, number, &w->block, error);
+            const int code = visit_block(t, &place, number, turn, w, error);
             if (code != SQLITE_OK) return code;
-            place_lattice(w, &place);
-            w->worst = -1;
-            walk_block(w, &place);
-            if (w->what == DRAW || w->worst < 0) continue;
-            const double error_here = rqt_code_metres(w->block->floor) + fmax(w->worst, 1.5 * g->step);
-            if (error_here > w->g->error) w->g->error = error_here;
         }
     return SQLITE_OK;
 }
@@ -283,8 +395,26 @@ static int look(tiles *t, int level, walk *w, char **error) {
     int first, last, code = SQLITE_OK;
     pixels_turns(w->g, &first, &last);
     for (int turn = first; turn <= last && code == SQLITE_OK; turn++)
-        if (pixels_turn(w->g, turn)) code = walk_blocks(t, level, w, error);
+        if (pixels_turn(w->g, turn)) code = walk_blocks(t, level, turn, w, error);
     return code;
+}
+
+/* The largest bound of all, when those that were too large have given way: the largest first, so that `seen` is
+ * soon what it can be. */
+static int find_error(tiles *t, walk *w, char **error) {
+    for (;;) {
+        measured *most = NULL;
+        for (size_t i = 0; i < w->count; i++)
+            if (!most || w->list[i].bound > most->bound) most = &w->list[i];
+        if (!most || most->bound < 0) return SQLITE_OK;
+        const double before = most->bound;
+        (void)pixels_turn(w->g, most->turn);
+        const int code = tighten(t, most->number, w, &most->bound, error);
+        if (code != SQLITE_OK) return code;
+        if (most->bound < before) continue;
+        w->g->error = before;
+        return SQLITE_OK;
+    }
 }
 
 /* The most that B and B' differ by. */
@@ -316,7 +446,9 @@ int leaves_draw(tiles *t, int shift, pixel_grid *g, char **error) {
     pixels_close(g);
     w->what = MEASURE;
     if (code == SQLITE_OK) code = look(t, level, w, error);
+    if (code == SQLITE_OK) code = find_error(t, w, error);
     g->error += find_bent(g) + t->terrain->quantum_error + ROUNDED;
+    sqlite3_free(w->list);
     sqlite3_free(w);
     return code;
 }

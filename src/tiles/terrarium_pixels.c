@@ -1,7 +1,8 @@
-/* terrarium_pixels.c - where the pixels of a tile lie, what their heights are told as, and what clients draw between
- * them.
+/* terrarium_pixels.c - where the pixels of a tile lie, what their heights are told as, and what clients draw
+ * between them.
  *
- * Places. Pixel (X,Y) of level z, counted over all tiles from 180 degrees west and from the north, has its centre at
+ * Places. Pixel (X,Y) of level z, counted over all tiles from 180 degrees west and from the north, has its centre
+ * at
  *
  *     longitude (X + 1/2) 360 / 2^(z+8) - 180,    latitude atan(sinh(pi (1 - (2Y + 1) / 2^(z+8))))
  *
@@ -55,7 +56,8 @@ bool pixels_turn(pixel_grid *g, int turn) {
     const int32_t width = g->terrain->lattice.width, height = g->terrain->lattice.height;
     for (int i = 0; i < GRID; i++) g->col[i] = (g->lon[i] + 360.0 * turn - at->x0) / at->dx;
     g->per_col = 1 / (g->col[1] - g->col[0]);
-    return width > 1 && height > 1 && g->col[GRID - 1] > 0 && g->col[0] < width - 1 && g->row[GRID - 1] > 0 && g->row[0] < height - 1;
+    return width > 1 && height > 1 && g->col[GRID - 1] > 0 && g->col[0] < width - 1 && g->row[GRID - 1] > 0 &&
+           g->row[0] < height - 1;
 }
 
 int32_t pixels_code(const pixel_grid *g, double metres) {

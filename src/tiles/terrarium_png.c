@@ -1,5 +1,6 @@
-/* terrarium_png.c - pixels as PNG (ISO 15948): red, green, blue of 8 bits, without alpha, for browsers multiply colours
- * by it. What the tile is off and how many of its pixels are void stands in two tEXt chunks before the pixels.
+/* terrarium_png.c - pixels as PNG (ISO 15948): red, green, blue of 8 bits, without alpha, for browsers multiply
+ * colours by it. What the tile is off and how many of its pixels are void stands in two tEXt chunks before the
+ * pixels.
  *
  * The bytes of a row are differences from the row above (filter Up): heights are smooth in both directions, and the
  * differences of green and blue wrap as those of the heights do. Measured on real tiles beside the other filters:
@@ -13,7 +14,7 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { ROW = 1 + 3 * PIXELS, FILTER_UP = 2, LEVEL = 4, RGB = 2, CHUNK = 12 };
+enum { ROW = 1 + 3 * PIXELS, FILTER_UP = 2, LEVEL = 1, RGB = 2, CHUNK = 12 };
 
 static uint8_t *put_number(uint8_t *p, uint32_t n) {
     for (int i = 0; i < 4; i++) p[i] = (uint8_t)(n >> (24 - 8 * i));

@@ -1,5 +1,5 @@
-/* terrarium_samples.c - pixels of the levels that have pixels about as large as samples: on the full-resolution mesh,
- * as rqt_height has it, and the error measured at every sample.
+/* terrarium_samples.c - pixels of the levels that have pixels about as large as samples: on the full-resolution
+ * mesh, as rqt_height has it, and the error measured at every sample.
  *
  * Both are loops over what lies around the tile, one window of samples, some 512 x 512 of them at most.
  */
@@ -33,8 +33,7 @@ static int read_window(tiles *t, const pixel_grid *g, window *w, char **error) {
     w->metres = (double *)w->q;
     w->q = (int32_t *)(w->metres + count);
     w->valid = (uint8_t *)(w->q + count);
-    const int code =
-        store_window(t->store, t->terrain, w->col, w->row, w->width, w->height, w->q, w->valid, error);
+    const int code = store_window(t->store, t->terrain, w->col, w->row, w->width, w->height, w->q, w->valid, error);
     for (size_t i = 0; i < count && code == SQLITE_OK; i++)
         w->metres[i] = w->valid[i] ? rqt_unit_metres(&t->terrain->unit, w->q[i]) : 0;
     return code;
