@@ -3,7 +3,8 @@
  *   terrarium.c          levels, which tiles there are, tile.json
  *   terrarium_pixels.c   where pixels lie; their heights, void ones, what is between them
  *   terrarium_samples.c  heights where the mesh has every sample, and how far the samples are from what is drawn
- *   terrarium_leaves.c   the same where the mesh is coarser
+ *   terrarium_leaves.c   heights where the mesh is coarser
+ *   terrarium_proof.c    how far the samples are from what is drawn, there
  *   terrarium_png.c      bytes
  */
 #ifndef RQT_TILES_TERRARIUM_H
