@@ -309,7 +309,6 @@ int store_query_tables(store *s, const store_terrain *t, store_question *questio
  * valid, all leaves are kept, and the mesh has no gap over the cell as far as there are samples; when all of the
  * block are void no leaf is kept, for each has two corners of it at least. */
 static int cover_of(store *s, const store_terrain *t, const rqt_answer *answer, store_cover *cover, char **error) {
-    const rqt_summary *summary = &answer->summary;
     const uint8_t *bytes;
     int size;
     rqt_block_header header;
@@ -318,8 +317,7 @@ static int cover_of(store *s, const store_terrain *t, const rqt_answer *answer, 
         code = store_fail(error, SQLITE_CORRUPT_VTAB, "terrain %s is damaged: block %llu", t->name, answer->number);
     sqlite3_reset(store_statements(s, t)->bytes);
     uint8_t all = RQT_VALID;
-    for (int i = 0; i < 4; i++) all &= summary->corner[i].flags;
-    for (int i = 0; i < 2 && answer->number > 1; i++) all &= summary->far[i].flags;
+    for (int i = 0; i < 2 && answer->number > 1; i++) all &= answer->summary.far[i].flags;
     *cover = STORE_COVER_UNKNOWN;
     if (code == SQLITE_OK && header.all_void) *cover = STORE_COVER_NOTHING;
     if (code == SQLITE_OK && !header.has_voids && !header.all_void && all) *cover = STORE_COVER_ALL;
