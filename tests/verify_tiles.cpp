@@ -403,7 +403,7 @@ void Judge::judge_horizon(const Tile &t, const std::vector<Vec> &places) {
     Promise &hides = verdict.of("header: from where the horizon point is hidden every vertex is");
     Promise &exists = verdict.of(
         "header: tiles of less than 45 degrees have a horizon point, hidden from the other side of the Earth");
-    const double far = length(t.horizon);
+    const double far = std::hypot(t.horizon.x, t.horizon.y, t.horizon.z); /* its square may be no double */
     const Vec d = t.horizon * (1 / far), other = std::fabs(d.z) < 0.9 ? Vec{0, 0, 1} : Vec{1, 0, 0};
     Vec side = cross(d, other);
     side = side * (1 / length(side));
