@@ -203,10 +203,35 @@ s.check("spoiled: a byte of a tile: the service has another", len(v.judge_servic
 s.check("... and so has --gzip", len(v.judge_compressed(DATABASE, copy)) == 1)
 unlist(copy)
 s.check("spoiled: tiles that are not listed: the service has them", any("is not listed, and the service answers" in f for f in v.judge_service(DATABASE, "t", copy)[2]))
-# Projected terrains say that they have none.
-flat = s.temp("flat.gpkg")
-s.import_terrain(flat, s.write_grid(s.temp("flat.asc"), s.rough_grid(9, 9, 1)), name="t")
-said, status = s.run([s.RQT, "tiles", flat, "-o", s.temp("flat")])
-s.equal("a terrain without tiles says so, and so does the service", (status, v.judge_refusal(flat, said)), (1, []))
+
+# ------------------------------------------------------------------------------------------- the Earth, and hardly anything
+
+
+def judged(name, raster):
+    database, folder = s.temp(name + ".gpkg"), s.temp(name)
+    s.import_terrain(database, raster, name="t")
+    s.run([s.RQT, "tiles", database, "-o", folder])
+    told, status = v.judge(raster, folder)
+    return told, status, v.listed(json.loads(v.read_files(folder)["layer.json"]))
+
+
+# Both columns at 180 degrees are there, and differ by a metre in some rows.
+told, status, tiles = judged("earth", os.path.join(s.DATA, "etopo1_1deg.tif"))
+s.check("F28_a_terrain_around_the_earth_closes_at_180_degrees", status == 0 and len(tiles) == 42 and "neighbours have the same vertices and normals on their side (70 looked at" in told, told)
+# Clients who find nothing at the first level look no further: there is a triangle, however little of a raster is valid.
+little = [[None] * 200 for _ in range(200)]
+for row, col in ((101, 101), (102, 102), (101, 102)):
+    little[row][col] = 5
+told, status, tiles = judged("little", s.write_grid(s.temp("little.asc"), little, 7, 46, 0.01, s.WGS84))
+s.check("F18_one_valid_half_cell_has_a_tile_at_every_level", status == 0 and [z for z, _, _ in tiles] == list(range(max(tiles)[0] + 1)), (tiles, told))
+
+# What has no tiles says so.
+for name, grid, place, sentence in (("flat", s.rough_grid(9, 9, 1), (), "in longitude and latitude on WGS 84"),
+                                    ("twice", s.rough_grid(90, 9, 1), (-180, 0, 5, s.WGS84), "it goes around the Earth more than once"),
+                                    ("beyond", s.rough_grid(9, 90, 1), (0, 50, 1, s.WGS84), "it has latitudes beyond a pole")):
+    database = s.temp(name + ".gpkg")
+    s.import_terrain(database, s.write_grid(s.temp(name + ".asc"), grid, *place), name="t")
+    said, status = s.run([s.RQT, "tiles", database, "-o", s.temp(name)])
+    s.check("a terrain without tiles says so, and so does the service: " + sentence, status == 1 and sentence in said and v.judge_refusal(database, said) == [], said)
 
 s.finish()
