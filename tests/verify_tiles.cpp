@@ -133,8 +133,10 @@ class Judge {
     /* Turns of longitude by which the tile's west..east lies on the raster. */
     std::vector<int> turns_of(const Tile &t) const {
         std::vector<int> turns;
-        for (int turn = -3; turn <= 3; turn++)
-            if (column(t.west + t.side, turn) >= 0 && column(t.west, turn) <= raster.width - 1)
+        const int first = (int)std::floor((raster.x0 - 180) / 360);
+        const int last = (int)std::ceil((raster.x0 + raster.width * raster.dx + 180) / 360);
+        for (int turn = first; turn <= last; turn++) /* the sides too, but for a rounding */
+            if (column(t.west + t.side, turn) >= -1e-9 && column(t.west, turn) <= raster.width - 1 + 1e-9)
                 turns.push_back(turn);
         return turns;
     }
@@ -482,7 +484,7 @@ void Judge::judge_normals(const Tile &t, int turn) {
             known = raster.normal(col + (k & 1), rows + (k >> 1), n);
             if (known) sum = sum + n * weight;
         }
-        if (!known) continue;
+        if (!known || std::fabs(t.height(i)) > 20000) continue; /* the terrain's are of the ellipsoid's ground */
         const Vec theirs = t.normal(i);
         const double angle = std::atan2(length(cross(sum, theirs)), dot(sum, theirs)) / RADIAN;
         p.worst = std::max(p.worst, angle);

@@ -132,7 +132,8 @@ int plan_has_triangle(tiles *t, const rqt_region *region, double eps, const stor
 int seam_read(tiles *t, char **error);
 /* If so: gives levels rules of their own. */
 int seam_close(tiles *t, char **error);
-/* ... gives vertices of the last column the heights of the first; by how much they may have moved: metres. */
+/* ... gives vertices of the last column the heights of the first; by how much samples of either may be off by that:
+ * metres. */
 double seam_merge(const tiles *t, rqt_patch *patch);
 
 typedef struct tile_mesh {

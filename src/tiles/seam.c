@@ -8,8 +8,8 @@
  * the blocks along both columns, once a level.
  *
  * Both have the heights of the first column. By as much as the last one's differ (rasters made by resampling differ
- * by a rounding) vertices are moved, and what tiles state has it. Columns that contradict each other, in voids or
- * by more than levels can bear, are two: no mesh is true to both.
+ * by a rounding) vertices are moved, and what tiles on both sides state has it. Columns that contradict each other,
+ * in voids or by more than levels can bear, are two: no mesh is true to both.
  */
 #include "internal.h"
 
@@ -56,9 +56,10 @@ double seam_merge(const tiles *t, rqt_patch *patch) {
     const int32_t last = t->terrain->lattice.width - 1;
     double most = 0;
     for (size_t i = 0; plan->seam && i < patch->vertex_count; i++) {
-        if (patch->vertices[i].col != last) continue;
-        patch->vertices[i].q = plan->seam[patch->vertices[i].row];
-        most = plan->merging;
+        rqt_patch_vertex *v = &patch->vertices[i];
+        if (v->col != 0 && v->col != last) continue;
+        v->q = plan->seam[v->row];
+        most = plan->merging; /* of the first column too, where samples of the last one are as well */
     }
     return most;
 }
