@@ -37,27 +37,13 @@ static int add_range(range_list *list, tile_range range) {
 
 /* Has the tile a triangle? */
 static int probe(tiles *t, int z, int32_t x, int32_t y, bool *is_there, char **error) {
-    store_limits *limits = store_limits_of(t->store);
-    const int64_t before = limits->triangles;
-    const store_query_options options = plan_options(t);
+    const store_query_options options = plan_options(t, z);
     rqt_region *region = NULL;
-    rqt_patch patch = {0};
     tile_place place;
     *is_there = false;
     if (!plan_place(t, z, x, y, &place) || place.turns == 0) return SQLITE_OK;
     int code = plan_region(t, &place, &region);
-    if (code == SQLITE_OK) {
-        limits->triangles = 1; /* more is not looked for */
-        code = store_query(t->store, t->terrain, region, plan_of(t)->level[z].eps, &options, &patch, NULL, error);
-        limits->triangles = before;
-        *is_there = code == SQLITE_TOOBIG || patch.triangle_count > 0;
-    }
-    if (code == SQLITE_TOOBIG) {
-        sqlite3_free(*error);
-        *error = NULL;
-        code = SQLITE_OK;
-    }
-    store_keep(t->store, &patch);
+    if (code == SQLITE_OK) code = plan_has_triangle(t, region, plan_of(t)->level[z].eps, &options, is_there, error);
     rqt_region_free(region);
     return code;
 }

@@ -189,7 +189,7 @@ static int list_side(tile_mesh *mesh, int side) {
 /* -------------------------------------------------------------------------------------------------- whole -- */
 
 static int cut_patch(tiles *t, const tile_place *place, rqt_patch *patch, tile_mesh *mesh, char **error) {
-    const store_query_options options = plan_options(t);
+    const store_query_options options = plan_options(t, place->z);
     rqt_region *region = NULL;
     waiting w = {t->store, SQLITE_INTERRUPT};
     int code = plan_region(t, place, &region);
@@ -197,6 +197,7 @@ static int cut_patch(tiles *t, const tile_place *place, rqt_patch *patch, tile_m
         code = store_query(t->store, t->terrain, region, plan_of(t)->level[place->z].eps, &options, patch, NULL,
                            error);
     if (code == SQLITE_OK) {
+        mesh->merged = seam_merge(t, patch);
         const rqt_status status =
             rqt_cut_make(patch, region, &t->terrain->lattice, store_allocator(), is_interrupted, &w, &mesh->cut);
         code = status == RQT_OK ? SQLITE_OK : status == RQT_INTERRUPTED ? w.code : SQLITE_NOMEM;
@@ -221,6 +222,7 @@ int mesh_make(tiles *t, const tile_place *place, tile_mesh *mesh, char **error) 
         for (size_t i = 0; i < n && code == SQLITE_OK; i++) code = place_vertex(t, place, mesh, i, error);
     }
     for (int side = 0; side < SIDES && code == SQLITE_OK; side++) code = list_side(mesh, side);
+    mesh->move[2] += mesh->merged;
     if (code == SQLITE_OK) state_errors(t, place, &patch, mesh);
     store_keep(t->store, &patch);
     return code;
