@@ -11,6 +11,8 @@
  *   water.c    the water mask
  *   encode.c   bytes
  *   layer.c    which tiles there are; layer.json
+ *
+ * terrarium: terrarium.h
  */
 #ifndef RQT_TILES_INTERNAL_H
 #define RQT_TILES_INTERNAL_H
