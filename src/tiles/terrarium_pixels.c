@@ -62,9 +62,10 @@ bool pixels_turn(pixel_grid *g, int turn) {
 
 int32_t pixels_code(const pixel_grid *g, double metres) {
     const int32_t step = (int32_t)(g->step * PER_METRE);
-    const double n = rint((metres - LOWEST) / g->step) * step;
-    if (n == NO_HEIGHT) return metres < 0 ? NO_HEIGHT - step : NO_HEIGHT + step;
-    return n < 0 ? 0 : n > CODES - 1 ? CODES - 1 : (int32_t)n;
+    const double n = (metres - LOWEST) / g->step + 0.5, most = (double)CODES / step - 1;
+    const int32_t code = step * (int32_t)(n < 0 ? 0 : n > most ? most : n);
+    if (code == NO_HEIGHT) return metres < 0 ? NO_HEIGHT - step : NO_HEIGHT + step;
+    return code;
 }
 
 void pixels_close(pixel_grid *g) {

@@ -49,16 +49,16 @@ static bool find_height(const window *w, int32_t x, int32_t y, double fx, double
     const size_t at[4] = {nw, nw + 1, nw + below, nw + below + 1};
     double weight[4];
     if ((x + y) % 2 == 0) { /* diagonal from north-west to south-east */
-        weight[0] = 1 - fmax(fx, fy);
-        weight[1] = fmax(fx - fy, 0);
-        weight[2] = fmax(fy - fx, 0);
-        weight[3] = fmin(fx, fy);
+        weight[0] = 1 - (fx > fy ? fx : fy);
+        weight[1] = fx > fy ? fx - fy : 0;
+        weight[2] = fy > fx ? fy - fx : 0;
+        weight[3] = fx < fy ? fx : fy;
     } else {
         const double sum = fx + fy;
-        weight[0] = fmax(1 - sum, 0);
+        weight[0] = sum < 1 ? 1 - sum : 0;
         weight[1] = sum < 1 ? fx : 1 - fy;
         weight[2] = sum < 1 ? fy : 1 - fx;
-        weight[3] = fmax(sum - 1, 0);
+        weight[3] = sum > 1 ? sum - 1 : 0;
     }
     *metres = 0;
     for (int c = 0; c < 4; c++) {
@@ -69,19 +69,25 @@ static bool find_height(const window *w, int32_t x, int32_t y, double fx, double
     return true;
 }
 
-static void draw_row(const window *w, int j, pixel_grid *g) {
+/* cols: the pixels' columns, as regions have them. */
+static void draw_row(const window *w, const double cols[GRID], int j, pixel_grid *g) {
     const int32_t width = g->terrain->lattice.width, height = g->terrain->lattice.height;
     const double row = to_units(g->row[j]);
     if (row < 0 || row > height - 1) return;
-    const int32_t y = (int32_t)fmin(row, height - 2);
+    const int32_t y = row < height - 1 ? (int32_t)row : height - 2;
     for (int i = 0; i < GRID; i++) {
-        const double col = to_units(g->col[i]);
         int32_t *code = &g->code[j * GRID + i];
         double metres;
-        if (*code != UNKNOWN || col < 0 || col > width - 1) continue;
-        const int32_t x = (int32_t)fmin(col, width - 2);
-        if (find_height(w, x, y, col - x, row - y, &metres)) *code = pixels_code(g, metres);
+        if (*code != UNKNOWN || cols[i] < 0 || cols[i] > width - 1) continue;
+        const int32_t x = cols[i] < width - 1 ? (int32_t)cols[i] : width - 2;
+        if (find_height(w, x, y, cols[i] - x, row - y, &metres)) *code = pixels_code(g, metres);
     }
+}
+
+static void draw(const window *w, pixel_grid *g) {
+    double cols[GRID];
+    for (int i = 0; i < GRID; i++) cols[i] = to_units(g->col[i]);
+    for (int j = 0; j < GRID; j++) draw_row(w, cols, j, g);
 }
 
 /* Where a row of samples lies among the pixels: the one above, and how far below it, as Mercator has it. */
@@ -143,7 +149,7 @@ int samples_draw(tiles *t, pixel_grid *g, char **error) {
         if (!pixels_turn(g, turn)) continue;
         turns[count] = turn;
         code = read_window(t, g, &windows[count], error);
-        for (int j = 0; j < GRID && code == SQLITE_OK; j++) draw_row(&windows[count], j, g);
+        if (code == SQLITE_OK) draw(&windows[count], g);
         count++;
     }
     pixels_close(g);

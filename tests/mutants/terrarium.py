@@ -18,8 +18,8 @@ MUTANTS = [
     # heights
     ("terrarium: pixels are at corners", PIXELS, "g->lon[i] = (first_x + i + 0.5) * 360", "g->lon[i] = (first_x + i) * 360", TERRARIUM, "the stated error holds"),
     ("terrarium: the other diagonal", SAMPLES, "if ((x + y) % 2 == 0) {", "if ((x + y) % 2 == 1) {", TERRARIUM, "rqt_height's"),
-    ("terrarium: land at 0 m is void", PIXELS, "if (n == NO_HEIGHT) return", "if (n == NO_HEIGHT && metres > 1) return", TERRARIUM, "a step above 0"),
-    ("terrarium: colours wrap", PIXELS, "return n < 0 ? 0 : n > CODES - 1 ? CODES - 1 : (int32_t)n;", "return (int32_t)n & (CODES - 1);", TERRARIUM, "nearest"),
+    ("terrarium: land at 0 m is void", PIXELS, "if (code == NO_HEIGHT) return", "if (code == NO_HEIGHT && metres > 1) return", TERRARIUM, "a step above 0"),
+    ("terrarium: colours wrap", PIXELS, "(n < 0 ? 0 : n > most ? most : n);", "(n < 0 ? n + most : n > most ? n - most : n);", TERRARIUM, "nearest"),
     ("terrarium: leaves without a height void nothing", LEAVES, "g->code[j * GRID + i] = NO_HEIGHT;", "(void)g;", TERRARIUM, "the stated error holds"),
     ("terrarium: pixels on sides are nobody's", LEAVES, "g->row[j] - SLACK, g->row[j] + SLACK, &west, &east)) continue;", "g->row[j] + 1e-3, g->row[j] + 2e-3, &west, &east)) continue;", TERRARIUM,
      "pixels in the raster"),
