@@ -27,7 +27,7 @@
 
 #define DEGREE 0.017453292519943295
 #define ROUNDED 1e-4 /* metres: what doubles and SLACK are */
-#define TIGHT 1.2
+#define TIGHT 1.25
 enum { MOST_SPLITS = 48, FEW_PIXELS = 8 };
 
 typedef struct proof {

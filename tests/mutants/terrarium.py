@@ -20,9 +20,7 @@ MUTANTS = [
     ("terrarium: the other diagonal", SAMPLES, "if ((x + y) % 2 == 0) {", "if ((x + y) % 2 == 1) {", TERRARIUM, "rqt_height's"),
     ("terrarium: land at 0 m is void", PIXELS, "if (code == NO_HEIGHT) return", "if (code == NO_HEIGHT && metres > 1) return", TERRARIUM, "a step above 0"),
     ("terrarium: colours wrap", PIXELS, "(n < 0 ? 0 : n > most ? most : n);", "(n < 0 ? n + most : n > most ? n - most : n);", TERRARIUM, "nearest"),
-    ("terrarium: leaves without a height void nothing", LEAVES, "g->code[j * GRID + i] = NO_HEIGHT;", "(void)g;", TERRARIUM, "the stated error holds"),
-    ("terrarium: pixels on sides are nobody's", LEAVES, "g->row[j] - SLACK, g->row[j] + SLACK, &west, &east)) continue;", "g->row[j] + 1e-3, g->row[j] + 2e-3, &west, &east)) continue;", TERRARIUM,
-     "pixels in the raster"),
+    ("terrarium: pixels on sides are nobody's", "src/tiles/terrarium_leaves.h", "#define SLACK 0x1p-30", "#define SLACK (-0x1p-3)", TERRARIUM, "pixels in the raster"),
     ("terrarium: longitudes count once", PIXELS, "*last = (int)ceil((e.east - g->lon[0]) / 360);", "*last = 0;", TERRARIUM, "turned"),
     # which there are, and bytes
     ("terrarium: one level less", KIND, "if (wide <= 1 && high <= 1) break;", "if (wide <= 2 && high <= 2) break;", TERRARIUM, "no wider than samples"),
@@ -32,5 +30,5 @@ MUTANTS = [
     ("terrarium: names of files are HTML", KIND, "else if (strchr(\"<>&\\\"'\", *p))", "else if (*p == 1)", TERRARIUM, "no HTML"),
     # addresses
     ("terrarium: any host will do", SERVE, "if (!isalnum((unsigned char)given[i]) && !strchr(others, given[i])) return;", "if (given[i] == 1) return;", TERRARIUM, "no host's name"),
-    ("terrarium: servers before us say nothing", SERVE, 'read_header(r, "X-Forwarded-Host", "-._:[]", host);', "", TERRARIUM, "as a server before us says"),
+    ("terrarium: servers before us name no folder", SERVE, 'read_header(r, "X-Forwarded-Prefix", "-._~/", prefix);', "prefix[0] = 0;", TERRARIUM, "as a server before us says"),
 ]
