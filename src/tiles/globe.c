@@ -139,7 +139,7 @@ static around list_samples(const tiles *t, const rqt_cut_vertex *v, rqt_patch *s
 }
 
 static uint8_t to_byte(double x) {
-    return (uint8_t)floor((x < -1 ? 0 : x > 1 ? 1 : x * 0.5 + 0.5) * 255 + 0.5);
+    return (uint8_t)((x < -1 ? 0 : x > 1 ? 1 : x * 0.5 + 0.5) * 255 + 0.5);
 }
 
 /* "A Survey of Efficient Representations for Independent Unit Vectors" (Cigolle and others, 2014): oct, 16 bits. */

@@ -206,35 +206,10 @@ static int cut_patch(tiles *t, const tile_place *place, rqt_patch *patch, tile_m
     return code;
 }
 
-/* The cut numbers a vertex when it meets it, which within a leaf is not the order of the triangles' corners; here
- * each gets the number of its first use (encode.c). */
-static int number_by_use(rqt_cut *cut) {
-    const size_t n = cut->vertex_count;
-    uint32_t *now = sqlite3_malloc64((n + 1) * sizeof *now), next = 0;
-    rqt_cut_vertex *before = sqlite3_malloc64((n + 1) * sizeof *before);
-    if (now && before) {
-        memset(now, 0xFF, n * sizeof *now);
-        if (n > 0) memcpy(before, cut->vertices, n * sizeof *before);
-        for (size_t i = 0; i < 3 * cut->triangle_count; i++) {
-            const uint32_t vertex = cut->triangles[i];
-            if (now[vertex] == UINT32_MAX) {
-                cut->vertices[next] = before[vertex];
-                now[vertex] = next++;
-            }
-            cut->triangles[i] = now[vertex];
-        }
-    }
-    const bool ok = now && before;
-    sqlite3_free(now);
-    sqlite3_free(before);
-    return ok ? SQLITE_OK : SQLITE_NOMEM;
-}
-
 int mesh_make(tiles *t, const tile_place *place, tile_mesh *mesh, char **error) {
     rqt_patch patch = {0};
     *mesh = (tile_mesh){0};
     int code = cut_patch(t, place, &patch, mesh, error);
-    if (code == SQLITE_OK) code = number_by_use(&mesh->cut);
     const size_t n = mesh->cut.vertex_count;
     if (code == SQLITE_OK) {
         mesh->u = sqlite3_malloc64((3 * n + 1) * sizeof *mesh->u);
