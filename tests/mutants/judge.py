@@ -4,9 +4,9 @@ JUDGE = "test_verify_tiles.py"
 SEAM, PLAN, GLOBE, TILES, MESH, ENDPOINTS = ("src/tiles/seam.c", "src/tiles/plan.c", "src/tiles/globe.c", "src/tiles/tiles.c", "src/tiles/mesh.c", "src/serve/endpoints.c")
 
 MUTANTS = [
-    ("judge: the antimeridian has vertices of one side", SEAM, "if (on[y] == on[h + y] || forced[lacks * h + y]) continue;", "if (y >= 0) continue;", JUDGE, "F28_a_terrain_around_the_earth"),
+    ("judge: the antimeridian has vertices of one side", SEAM, "if (on[y] == on[h + y] || forced[lacks * h + y]) continue;", "if (y >= 0) continue;", JUDGE, "F28_a_ring_of_rough"),
     ("judge: ... heights of its own on either side", SEAM, "v->q = plan->seam[v->row];", "", JUDGE, "F28_a_terrain_around_the_earth"),
-    ("judge: ... and what they differ by is not stated", SEAM, "most = plan->merging;", "most = 0;", JUDGE, "F28_a_terrain_around_the_earth"),
+    ("judge: ... and what they differ by is not stated", SEAM, "most = plan->merging;", "most = 0;", JUDGE, "F28_a_ring_of_rough"),
     ("judge: normals of the antimeridian are one side's", GLOBE, "const bool is_seam = plan_of(t)->seam &&", "const bool is_seam = false &&", JUDGE, "F28_a_terrain_around_the_earth"),
     ("judge: terrains of voids have no first tile", PLAN, "while (code == SQLITE_OK && !is_there && most > cell / 2)", "while (code != SQLITE_OK)", JUDGE, "F18_one_valid_half_cell"),
     ("judge: terrains may go around twice", TILES, "e.east - e.west > 360 * most", "e.east - e.west > 3600 * most", JUDGE, "it goes around the Earth more than once"),
