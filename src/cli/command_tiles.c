@@ -7,21 +7,22 @@
 #include <unistd.h>
 
 static const char HELP[] =
-    "rqt tiles: a terrain as quantized-mesh tiles for globes (Cesium and others), each with a proven error\n"
+    "rqt tiles: a terrain as tiles for globes and maps, each with a proven error\n"
     "\n"
     "Usage: rqt tiles DATABASE -o FOLDER [OPTION...]\n"
     "\n"
-    "Writes FOLDER/z/x/y.terrain and FOLDER/layer.json, the same bytes that rqt serve answers with. For terrains "
-    "in\n"
-    "longitude and latitude on WGS 84. What is in the folder already is not made again: after a kill the same "
-    "command\n"
-    "goes on there. layer.json comes last.\n"
+    "Writes the tiles into FOLDER, and at last the document that describes them: the same bytes that rqt serve\n"
+    "answers with. For terrains in longitude and latitude on WGS 84. What is in the folder already is not made\n"
+    "again: after a kill the same command goes on there.\n"
+    "\n"
+    "Kinds:\n"
+    "  quantized-mesh       z/x/y.terrain, layer.json: Cesium and other globes\n"
     "\n"
     "Options:\n"
     "  -o, --output FOLDER  made if it is not there\n"
+    "  --kind K             of the kinds above (default: quantized-mesh)\n"
     "  --terrain T          of several terrains\n"
-    "  --levels A-B         levels A to B, or one (default: 0 to the first whose tiles have at most 64 samples a "
-    "side)\n"
+    "  --levels A-B         levels A to B, or one (default: all, to the first with the resolution of the raster)\n"
     "  --gzip               tiles compressed, to be served with Content-Encoding: gzip\n"
     "  --jobs J             workers (default: one for each processor)\n"
     "  --help               this text\n"
@@ -30,13 +31,11 @@ static const char HELP[] =
     "  rqt tiles washington.gpkg -o tiles\n"
     "  rqt tiles alps.gpkg --terrain swiss --levels 0-12 --gzip -o /srv/www/tiles\n";
 
-static const struct option OPTIONS[] = {{"output", required_argument, NULL, 'o'},
-                                        {"terrain", required_argument, NULL, 't'},
-                                        {"levels", required_argument, NULL, 'l'},
-                                        {"gzip", no_argument, NULL, 'g'},
-                                        {"jobs", required_argument, NULL, 'j'},
-                                        {"help", no_argument, NULL, 'h'},
-                                        {NULL, 0, NULL, 0}};
+static const struct option OPTIONS[] = {
+    {"output", required_argument, NULL, 'o'},  {"kind", required_argument, NULL, 'k'},
+    {"terrain", required_argument, NULL, 't'}, {"levels", required_argument, NULL, 'l'},
+    {"gzip", no_argument, NULL, 'g'},          {"jobs", required_argument, NULL, 'j'},
+    {"help", no_argument, NULL, 'h'},          {NULL, 0, NULL, 0}};
 
 /* "3-7" or "5". */
 static bool read_levels(const char *text, tiles_job *job) {
@@ -50,6 +49,14 @@ static bool read_levels(const char *text, tiles_job *job) {
     job->first = (int)first;
     job->last = (int)last;
     return true;
+}
+
+static int say_kinds(const char *unknown) {
+    char known[256] = "";
+    for (const tile_kind *const *kind = tile_kinds; *kind; kind++)
+        snprintf(known + strlen(known), sizeof known - strlen(known), "%s%s", kind == tile_kinds ? "" : ", ",
+                 (*kind)->name);
+    return cli_usage("--kind %s: there is no such kind of tiles, but %s", unknown, known);
 }
 
 static sqlite3 *connect(void *context) {
@@ -83,7 +90,8 @@ static int write_tiles(tiles_job *job) {
 
 static int run(int argc, char **argv) {
     const long processors = sysconf(_SC_NPROCESSORS_ONLN);
-    tiles_job job = {.last = TILES_LEVELS - 1,
+    tiles_job job = {.kind = tile_kinds[0],
+                     .last = TILES_LEVELS - 1,
                      .workers = processors > 0 && processors <= 64 ? (int)processors : 1,
                      .connect = connect,
                      .progress = show};
@@ -92,6 +100,10 @@ static int run(int argc, char **argv) {
         switch (option) {
         case 'o':
             job.folder = optarg;
+            break;
+        case 'k':
+            job.kind = tiles_kind(optarg);
+            if (!job.kind) return say_kinds(optarg);
             break;
         case 't':
             job.terrain = optarg;
@@ -120,4 +132,4 @@ static int run(int argc, char **argv) {
     return write_tiles(&job);
 }
 
-const cli_command command_tiles = {"tiles", "a terrain as tiles for globes (quantized-mesh)", run};
+const cli_command command_tiles = {"tiles", "a terrain as tiles for globes and maps", run};

@@ -49,7 +49,7 @@ void buffer_string(buffer *b, const char *text);
 void buffer_free(buffer *b);
 
 /* ------------------------------------------------------------------------------------------------- requests -- */
-enum { MOST_SEGMENTS = 7, MOST_PARAMETERS = 32, MOST_TARGET = 32768 };
+enum { MOST_SEGMENTS = 8, MOST_PARAMETERS = 32, MOST_TARGET = 32768 };
 /* For MHD: a connection's memory holds target and headers twice over. */
 enum { CONNECTION_MEMORY = 131072 };
 
@@ -242,9 +242,9 @@ void answer_profile(worker *w, request *r);
 void answer_verify(worker *w, request *r);
 void answer_explain(worker *w, request *r);
 void answer_area(worker *w, request *r);
-void answer_cesium(worker *w, request *r);
-void answer_layer(worker *w, request *r);
+void answer_tile_document(worker *w, request *r);
 void answer_tile(worker *w, request *r);
+void answer_cesium(worker *w, request *r);
 void answer_health(worker *w, request *r);
 void answer_metrics(worker *w, request *r);
 

@@ -174,7 +174,7 @@ int encode_tile(tiles *t, const tile_place *place, const tile_mesh *mesh, tile_b
     writer w = {.capacity = 4096 + HEADER + 8 * cut->vertex_count + (3 * cut->triangle_count + 1024) * index};
     w.bytes = sqlite3_malloc64(w.capacity);
     w.no_memory = !w.bytes;
-    put_header(&w, t->plan, &globe);
+    put_header(&w, plan_of(t), &globe);
     put_number(&w, cut->vertex_count, 4);
     put_differences(&w, mesh->u, cut->vertex_count);
     put_differences(&w, mesh->v, cut->vertex_count);
@@ -182,8 +182,8 @@ int encode_tile(tiles *t, const tile_place *place, const tile_mesh *mesh, tile_b
     put_triangles(&w, cut, index);
     put_sides(&w, mesh, index);
     code = put_normals(&w, t, mesh, &globe, error);
-    if (t->plan->has_sea) put_water(&w, t, place);
-    put_metadata(&w, t->plan, place, mesh);
+    if (plan_of(t)->has_sea) put_water(&w, t, place);
+    put_metadata(&w, plan_of(t), place, mesh);
     globe_free(&globe);
     if (code == SQLITE_OK && w.no_memory) code = SQLITE_NOMEM;
     if (code == SQLITE_OK)

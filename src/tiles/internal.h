@@ -1,13 +1,15 @@
 /* internal.h - the parts of the tiles.
  *
- *   tiles.c    a connection's tiles: the plan of its terrain, kept while nothing changes
+ *   tiles.c    kinds; a connection's tiles: the plan of its terrain, kept while nothing changes
+ *   pyramid.c  to disk
+ *
+ * quantized-mesh (quantized_mesh.c):
  *   plan.c     levels and their tolerances, heights, where tiles lie on the raster
  *   mesh.c     the terrain's mesh, cut to a tile and quantised; what it is off
  *   globe.c    places in space: bounding sphere, horizon, normals
  *   water.c    the water mask
  *   encode.c   bytes
  *   layer.c    which tiles there are; layer.json
- *   pyramid.c  to disk
  */
 #ifndef RQT_TILES_INTERNAL_H
 #define RQT_TILES_INTERNAL_H
@@ -15,6 +17,49 @@
 #include "geo.h"
 #include "tiles.h"
 
+/* ----------------------------------------------------------------------------------------------- all kinds -- */
+enum { KEPT_PLANS = 8 };
+/* What a kind has worked out of a terrain in one state of the database. */
+typedef struct kept_plan {
+    const tile_kind *kind;
+    char name[64];
+    uint64_t state; /* store_state when it was made; 0: not to be kept */
+    void *plan;     /* NULL: none */
+} kept_plan;
+struct tiles {
+    sqlite3 *db;
+    store *store;
+    const tile_kind *kind;        /* between begin and end */
+    const store_terrain *terrain; /* likewise */
+    void *plan;                   /* likewise: the kind's own */
+    kept_plan kept[KEPT_PLANS];
+    int next; /* place of the plan that goes next */
+};
+
+/* What a kind has to know. t has its terrain and, but for plan_create, its plan. */
+typedef struct tile_functions {
+    int (*plan_create)(tiles *t, void **plan, char **error);
+    void (*plan_free)(void *plan); /* NULL is passed over */
+    int (*finest)(const tiles *t);
+    int (*available)(tiles *t, int series, int z, const tile_range **ranges, size_t *count, char **error);
+    int (*make)(tiles *t, int series, int z, int32_t x, int32_t y, tile_bytes *out, char **error);
+    int (*document)(tiles *t, const char *root, int first, int last, tile_bytes *out, char **error);
+} tile_functions;
+extern const tile_kind quantized_mesh;
+
+/* A sentence into *error; returns SQLITE_ERROR, or SQLITE_NOMEM. */
+int tiles_fail(char **error, const char *format, ...) __attribute__((format(printf, 2, 3)));
+int tiles_fail_database(char **error, sqlite3 *db, int code);
+/* Is the terrain in longitude and latitude on WGS 84, north up? SQLITE_ERROR with a sentence if not. */
+int tiles_check_place(const store_terrain *t, char **error);
+/* Are its heights those above the ellipsoid, or above EGM96? Likewise. */
+int tiles_check_heights(const store_terrain *t, bool *is_above_geoid, char **error);
+geo_extent tiles_extent(const store_terrain *t);
+/* The document's text as the answer; releases it and the JSON. */
+struct cJSON;
+int tiles_print(struct cJSON *document, tile_bytes *out);
+
+/* ------------------------------------------------------------------------------------------ quantized-mesh -- */
 enum { TILE_UNITS = 32767 }; /* a tile's side, and the range of heights, in what is stored */
 
 typedef struct tile_level {
@@ -28,8 +73,6 @@ typedef struct sea_run {
 
 /* What all tiles of a terrain have in common. */
 typedef struct tile_plan {
-    char name[64];
-    uint64_t state; /* store_state when it was made; 0: not to be kept */
     int finest;
     tile_level level[TILES_LEVELS];
     double lowest, step; /* a height n is lowest + n * step metres, 0 <= n <= TILE_UNITS; step a power of two */
@@ -45,22 +88,11 @@ typedef struct tile_plan {
     size_t range_count[TILES_LEVELS];
 } tile_plan;
 
-enum { KEPT_PLANS = 8 };
-struct tiles {
-    sqlite3 *db;
-    store *store;
-    const store_terrain *terrain; /* between begin and end */
-    tile_plan *plan;              /* of the terrain, likewise */
-    tile_plan *kept[KEPT_PLANS];
-    int next; /* place of the plan that goes next */
-};
-
-/* A sentence into *error; returns SQLITE_ERROR, or SQLITE_NOMEM. plan.c */
-int tiles_fail(char **error, const char *format, ...) __attribute__((format(printf, 2, 3)));
-int tiles_fail_database(char **error, sqlite3 *db, int code);
-
-int plan_create(tiles *t, uint64_t state, tile_plan **out, char **error);
-void plan_free(tile_plan *plan);
+static inline tile_plan *plan_of(const tiles *t) {
+    return t->plan;
+}
+int plan_create(tiles *t, void **out, char **error);
+void plan_free(void *plan);
 
 /* A tile on the raster: in samples, not rounded, for each time that it meets the raster (longitudes are the same
  * modulo 360). */
@@ -119,6 +151,9 @@ enum { WATER_SIDE = 256 };
 int water_read(tiles *t, tile_plan *plan, char **error);
 /* Pixels from the north-west on; how many of them there are: 1 where all are the same. */
 size_t water_mask(const tiles *t, const tile_place *place, uint8_t mask[WATER_SIDE * WATER_SIDE]);
+
+int layer_available(tiles *t, int z, const tile_range **ranges, size_t *count, char **error);
+int layer_make(tiles *t, int first, int last, tile_bytes *out, char **error);
 
 int encode_tile(tiles *t, const tile_place *place, const tile_mesh *mesh, tile_bytes *out, char **error);
 

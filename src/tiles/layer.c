@@ -46,7 +46,7 @@ static int probe(tiles *t, int z, int32_t x, int32_t y, bool *is_there, char **e
     int code = plan_region(t, &place, &region);
     if (code == SQLITE_OK) {
         limits->triangles = 1; /* more is not looked for */
-        code = store_query(t->store, t->terrain, region, t->plan->level[z].eps, &options, &patch, NULL, error);
+        code = store_query(t->store, t->terrain, region, plan_of(t)->level[z].eps, &options, &patch, NULL, error);
         limits->triangles = before;
         *is_there = code == SQLITE_TOOBIG || patch.triangle_count > 0;
     }
@@ -76,7 +76,7 @@ static int add_row(tiles *t, int z, int32_t y, int32_t x0, int32_t x1, range_lis
     return SQLITE_OK;
 }
 
-int tiles_available(tiles *t, int z, const tile_range **ranges, size_t *count, char **error) {
+int layer_available(tiles *t, int z, const tile_range **ranges, size_t *count, char **error) {
     tile_plan *plan = t->plan;
     tile_range all[MOST_TURNS];
     range_list list = {0};
@@ -115,7 +115,7 @@ static int add_available(tiles *t, int first, int last, cJSON *layer, char **err
     for (int z = 0; z <= last; z++) {
         const tile_range *ranges = NULL;
         size_t count = 0;
-        const int code = z < first ? SQLITE_OK : tiles_available(t, z, &ranges, &count, error);
+        const int code = z < first ? SQLITE_OK : layer_available(t, z, &ranges, &count, error);
         if (code != SQLITE_OK) return code;
         cJSON *list = cJSON_CreateArray();
         for (size_t i = 0; i < count; i++) {
@@ -163,36 +163,25 @@ static cJSON *describe(const tiles *t, int first, int last) {
     cJSON_AddStringToObject(layer, "scheme", "tms");
     cJSON_AddStringToObject(layer, "projection", "EPSG:4326");
     cJSON_AddItemToObject(layer, "tiles", cJSON_CreateStringArray(templates, 1));
-    cJSON_AddItemToObject(layer, "extensions", cJSON_CreateStringArray(extensions, t->plan->has_sea ? 3 : 2));
+    cJSON_AddItemToObject(layer, "extensions", cJSON_CreateStringArray(extensions, plan_of(t)->has_sea ? 3 : 2));
     cJSON_AddNumberToObject(layer, "minzoom", first);
     cJSON_AddNumberToObject(layer, "maxzoom", last);
     add_bounds(t->terrain, layer);
     add_attribution(t->terrain, layer);
     /* For people: what clients take each level to be off, and the part that the mesh has of it. */
     for (int z = 0; z <= last; z++) {
-        errors[z] = t->plan->level[z].geometric_error;
-        eps[z] = t->plan->level[z].eps;
+        errors[z] = plan_of(t)->level[z].geometric_error;
+        eps[z] = plan_of(t)->level[z].eps;
     }
     cJSON_AddItemToObject(layer, "geometricErrors", cJSON_CreateDoubleArray(errors, last + 1));
     cJSON_AddItemToObject(layer, "eps", cJSON_CreateDoubleArray(eps, last + 1));
     return layer;
 }
 
-int tiles_layer(tiles *t, int first, int last, tile_bytes *out, char **error) {
-    *out = (tile_bytes){0};
-    if (last > t->plan->finest) last = t->plan->finest;
+int layer_make(tiles *t, int first, int last, tile_bytes *out, char **error) {
     cJSON *layer = describe(t, first, last);
     const int code = add_available(t, first, last, layer, error);
-    char *text = code == SQLITE_OK ? cJSON_PrintUnformatted(layer) : NULL;
+    if (code == SQLITE_OK) return tiles_print(layer, out);
     cJSON_Delete(layer);
-    if (code != SQLITE_OK) return code;
-    const size_t size = text ? strlen(text) : 0;
-    out->bytes = text ? sqlite3_malloc64(size + 1) : NULL;
-    if (out->bytes) {
-        memcpy(out->bytes, text, size);
-        out->bytes[size] = '\n';
-        out->size = size + 1;
-    }
-    cJSON_free(text);
-    return out->bytes ? SQLITE_OK : SQLITE_NOMEM;
+    return code;
 }

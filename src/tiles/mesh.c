@@ -194,8 +194,8 @@ static int cut_patch(tiles *t, const tile_place *place, rqt_patch *patch, tile_m
     waiting w = {t->store, SQLITE_INTERRUPT};
     int code = plan_region(t, place, &region);
     if (code == SQLITE_OK)
-        code =
-            store_query(t->store, t->terrain, region, t->plan->level[place->z].eps, &options, patch, NULL, error);
+        code = store_query(t->store, t->terrain, region, plan_of(t)->level[place->z].eps, &options, patch, NULL,
+                           error);
     if (code == SQLITE_OK) {
         const rqt_status status =
             rqt_cut_make(patch, region, &t->terrain->lattice, store_allocator(), is_interrupted, &w, &mesh->cut);

@@ -26,7 +26,6 @@
 #include "internal.h"
 
 #include <math.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -39,54 +38,13 @@ enum { LARGEST_TILE = 64, FIRST_STEP = -10, UNIT_BITS = 20 };
 #define LAST_EPS 0.625
 #define FARTHEST ((int64_t)1 << 60) /* units: as regions have it */
 
-int tiles_fail(char **error, const char *format, ...) {
-    va_list arguments;
-    va_start(arguments, format);
-    char *text = sqlite3_vmprintf(format, arguments);
-    va_end(arguments);
-    sqlite3_free(*error);
-    *error = text;
-    return text ? SQLITE_ERROR : SQLITE_NOMEM;
-}
-
-int tiles_fail_database(char **error, sqlite3 *db, int code) {
-    const int failed = tiles_fail(error, "%s", sqlite3_errmsg(db));
-    return failed == SQLITE_NOMEM ? failed : code;
-}
-
 /* ------------------------------------------------------------------------------------------------- levels -- */
-
-static int check_terrain(const store_terrain *t, bool *is_above_geoid, char **error) {
-    *is_above_geoid = sqlite3_strlike("%EGM96%", t->vertical, 0) == 0;
-    if (!t->lonlat || !t->wgs84 || t->placement.dx <= 0 || t->placement.dy >= 0)
-        return tiles_fail(
-            error, "terrain %s has no tiles: they are of terrains in longitude and latitude on WGS 84", t->name);
-    if (!*is_above_geoid && t->vertical[0] && sqlite3_strlike("%ellipsoid%", t->vertical, 0))
-        return tiles_fail(error,
-                          "terrain %s has no tiles: its heights are \"%s\", and only those above the ellipsoid and "
-                          "above EGM96 can be placed in space",
-                          t->name, t->vertical);
-    return SQLITE_OK;
-}
-
-static geo_extent extent_of(const store_terrain *t) {
-    const rqt_placement *at = &t->placement;
-    const double low = rqt_unit_metres(&t->unit, t->min_q), high = rqt_unit_metres(&t->unit, t->max_q);
-    return (geo_extent){.west = at->x0,
-                        .east = at->x0 + (t->lattice.width - 1) * at->dx,
-                        .south = at->y0 + (t->lattice.height - 1) * at->dy,
-                        .north = at->y0,
-                        .lon_step = at->dx,
-                        .lat_step = -at->dy,
-                        .lowest = fmin(low, high),
-                        .highest = fmax(low, high)};
-}
 
 /* The rule, lowered; what is known of the geoid. */
 static int make_rule(const store_terrain *t, tile_plan *plan, bool is_above_geoid, char **error) {
     char why[256] = "";
     const geo_ellipsoid wgs84 = GEO_WGS84;
-    const geo_extent extent = extent_of(t);
+    const geo_extent extent = tiles_extent(t);
     double lowering[RQT_RANKS];
     geo_frame *frame = NULL;
     const int made = geo_frame_create(GEO_ECEF, &wgs84, 0, 0, is_above_geoid, &frame, why, sizeof why);
@@ -107,7 +65,7 @@ static int make_rule(const store_terrain *t, tile_plan *plan, bool is_above_geoi
 }
 
 static void set_heights(const store_terrain *t, tile_plan *plan) {
-    const geo_extent extent = extent_of(t);
+    const geo_extent extent = tiles_extent(t);
     const double low = extent.lowest - plan->undulation.most, high = extent.highest + plan->undulation.most;
     plan->step = ldexp(1, FIRST_STEP);
     for (;; plan->step *= 2) {
@@ -135,15 +93,15 @@ static void set_levels(const store_terrain *t, tile_plan *plan) {
     }
 }
 
-int plan_create(tiles *t, uint64_t state, tile_plan **out, char **error) {
+int plan_create(tiles *t, void **out, char **error) {
     const store_terrain *terrain = t->terrain;
     bool is_above_geoid;
-    int code = check_terrain(terrain, &is_above_geoid, error);
+    int code = tiles_check_place(terrain, error);
+    if (code == SQLITE_OK) code = tiles_check_heights(terrain, &is_above_geoid, error);
     if (code != SQLITE_OK) return code;
     tile_plan *plan = sqlite3_malloc(sizeof *plan);
     if (!plan) return SQLITE_NOMEM;
-    *plan = (tile_plan){.state = state, .rounded = terrain->quantum_error};
-    snprintf(plan->name, sizeof plan->name, "%s", terrain->name);
+    *plan = (tile_plan){.rounded = terrain->quantum_error};
     code = make_rule(terrain, plan, is_above_geoid, error);
     if (code == SQLITE_OK) {
         set_heights(terrain, plan);
@@ -157,7 +115,8 @@ int plan_create(tiles *t, uint64_t state, tile_plan **out, char **error) {
     return code;
 }
 
-void plan_free(tile_plan *plan) {
+void plan_free(void *made) {
+    tile_plan *plan = made;
     if (!plan) return;
     rqt_rule_free(plan->rule);
     geo_frame_free(plan->geoid);
@@ -171,7 +130,7 @@ store_query_options plan_options(const tiles *t) {
                                  .outline = RQT_OUTLINE_TOL,
                                  .metric = RQT_METRIC_EXACT,
                                  .product = RQT_PRODUCT_TRIANGLES,
-                                 .rule = t->plan->rule};
+                                 .rule = plan_of(t)->rule};
 }
 
 /* ------------------------------------------------------------------------------------------------- places -- */
@@ -211,13 +170,13 @@ static void place_rows(const tiles *t, double side, int32_t y, tile_turn *out) {
 
 /* The turns on which the globe's 360 degrees may meet the raster. */
 static void find_turns(const tiles *t, int *first, int *last) {
-    const geo_extent e = extent_of(t->terrain);
+    const geo_extent e = tiles_extent(t->terrain);
     *first = (int)floor((e.west - 180) / 360);
     *last = (int)ceil((e.east + 180) / 360);
 }
 
 bool plan_place(const tiles *t, int z, int32_t x, int32_t y, tile_place *place) {
-    if (z < 0 || z > t->plan->finest || x < 0 || y < 0 || x >= 2 << z || y >= 1 << z) return false;
+    if (z < 0 || z > plan_of(t)->finest || x < 0 || y < 0 || x >= 2 << z || y >= 1 << z) return false;
     const double side = ldexp(180, -z);
     int first, last;
     *place = (tile_place){.z = z, .x = x, .y = y, .west = -180 + x * side, .south = -90 + y * side, .side = side};
@@ -238,7 +197,7 @@ static int32_t clamp_tile(double n, int32_t count) {
 
 /* The columns of tiles that meet the raster on a turn; false: none. */
 static bool range_of_columns(const tiles *t, double side, int turn, int32_t count, tile_range *range) {
-    const geo_extent e = extent_of(t->terrain);
+    const geo_extent e = tiles_extent(t->terrain);
     const int32_t width = t->terrain->lattice.width;
     tile_turn at;
     range->x0 = clamp_tile(floor((e.west - 360.0 * turn + 180) / side) - 1, count);
@@ -255,7 +214,7 @@ static bool range_of_columns(const tiles *t, double side, int turn, int32_t coun
 }
 
 static bool range_of_rows(const tiles *t, double side, int32_t count, tile_range *range) {
-    const geo_extent e = extent_of(t->terrain);
+    const geo_extent e = tiles_extent(t->terrain);
     const int32_t height = t->terrain->lattice.height;
     tile_turn at;
     range->y0 = clamp_tile(floor((e.south + 90) / side) - 1, count);

@@ -1,10 +1,11 @@
-/* pyramid.c - all tiles of a terrain as files: FOLDER/z/x/y.terrain, and FOLDER/layer.json when all are there.
+/* pyramid.c - all tiles of a terrain as files, FOLDER/z/x/y.terrain or as their kind names them, and its document,
+ * as FOLDER/layer.json, when all are there.
  *
  * Workers take pieces of rows, each with a connection of its own; a tile's bytes depend on nothing but the terrain,
  * so it does not matter which makes it. Each file is written beside its place and renamed: it is there whole or not
  * at all, and what is there need not be made again. FOLDER/.rqt-tiles says of what the tiles are: terrain, state of
  * the database, options. A folder that says something else is another's, and is refused; while somebody works in it
- * the file is locked. layer.json comes last, so a folder that has it is complete.
+ * the file is locked. The document comes last, so a folder that has it is complete.
  */
 #include "internal.h"
 
@@ -24,7 +25,7 @@ enum { PIECE = 32, MOST_PATH = 4096, GZIP_LEVEL = 5, GZIP_WINDOW = 15 + 16, GZIP
 
 /* Tiles x0..x1 of one row. */
 typedef struct piece {
-    int z;
+    int series, z;
     int32_t y, x0, x1;
 } piece;
 
@@ -100,11 +101,11 @@ static char *describe_job(const tiles_job *job, const tiles *t, int last) {
     snprintf(path, sizeof path, "%s-wal", job->database);
     if (stat(job->database, &file) || stat(path, &log)) log = (struct stat){0};
     return sqlite3_mprintf(
-        "rqt %s\nterrain %s of %s\ndatabase %lld bytes, %lld.%09ld s, log %lld bytes, %lld.%09ld s\n"
+        "rqt %s\n%s of terrain %s of %s\ndatabase %lld bytes, %lld.%09ld s, log %lld bytes, %lld.%09ld s\n"
         "levels %d to %d%s\n",
-        RQT_VERSION, t->terrain->name, t->terrain->created, (long long)file.st_size, (long long)file.st_mtim.tv_sec,
-        (long)file.st_mtim.tv_nsec, (long long)log.st_size, (long long)log.st_mtim.tv_sec,
-        (long)log.st_mtim.tv_nsec, job->first, last, job->gzip ? ", gzip" : "");
+        RQT_VERSION, job->kind->name, t->terrain->name, t->terrain->created, (long long)file.st_size,
+        (long long)file.st_mtim.tv_sec, (long)file.st_mtim.tv_nsec, (long long)log.st_size,
+        (long long)log.st_mtim.tv_sec, (long)log.st_mtim.tv_nsec, job->first, last, job->gzip ? ", gzip" : "");
 }
 
 /* Does a connection that has begun to read see what the tiles are of? Asked after it has begun: a commit in between
@@ -124,11 +125,13 @@ static int write_tile(pyramid *p, tiles *t, const piece *row, int32_t x, char **
     char path[MOST_PATH];
     struct stat there;
     tile_bytes tile;
-    snprintf(path, sizeof path, "%s/%d/%d/%d.terrain", p->job->folder, row->z, (int)x, (int)row->y);
+    const tile_series *series = &p->job->kind->series[row->series];
+    snprintf(path, sizeof path, "%s/%s%d/%d/%d%s", p->job->folder, series->folder, row->z, (int)x, (int)row->y,
+             series->suffix);
     if (stat(path, &there) == 0) return SQLITE_OK;
-    int code = tiles_make(t, row->z, x, row->y, &tile, error);
+    int code = tiles_make(t, row->series, row->z, x, row->y, &tile, error);
     if (code == SQLITE_OK && tile.size > 0) {
-        if (p->job->gzip) code = pack(&tile);
+        if (p->job->gzip && !series->is_packed) code = pack(&tile);
         if (code == SQLITE_OK) code = write_file(path, tile.bytes, tile.size, error);
         if (code == SQLITE_OK) {
             p->written++;
@@ -140,7 +143,7 @@ static int write_tile(pyramid *p, tiles *t, const piece *row, int32_t x, char **
 }
 
 static int write_pieces(pyramid *p, tiles *t, char **error) {
-    int code = tiles_begin(t, p->job->terrain, error);
+    int code = tiles_begin(t, p->job->kind, p->job->terrain, error);
     if (code != SQLITE_OK) return code;
     code = check_state(p, t, error);
     for (size_t n; code == SQLITE_OK && (n = p->next++) < p->count;)
@@ -217,7 +220,7 @@ static int run_workers(pyramid *p, int64_t all, char **error) {
 
 /* ----------------------------------------------------------------------------------------------------- whole -- */
 
-static int add_pieces(pyramid *p, int z, const tile_range *r, size_t *capacity, int64_t *all) {
+static int add_pieces(pyramid *p, int series, int z, const tile_range *r, size_t *capacity, int64_t *all) {
     for (int32_t y = r->y0; y <= r->y1; y++)
         for (int32_t x = r->x0; x <= r->x1; x += PIECE) {
             if (p->count == *capacity) {
@@ -227,35 +230,46 @@ static int add_pieces(pyramid *p, int z, const tile_range *r, size_t *capacity, 
                 p->pieces = more;
             }
             const int32_t last = x + PIECE - 1 < r->x1 ? x + PIECE - 1 : r->x1;
-            p->pieces[p->count++] = (piece){z, y, x, last};
+            p->pieces[p->count++] = (piece){series, z, y, x, last};
             *all += last - x + 1;
         }
     return SQLITE_OK;
 }
 
-static int make_folders(const tiles_job *job, int z, const tile_range *r, char **error) {
+static int make_folders(const tiles_job *job, int series, int z, const tile_range *r, char **error) {
+    const char *folder = job->kind->series[series].folder;
     char path[MOST_PATH];
-    snprintf(path, sizeof path, "%s/%d", job->folder, z);
+    snprintf(path, sizeof path, "%s/%s%d", job->folder, folder, z);
     int code = make_folder(path, error);
     for (int32_t x = r->x0; x <= r->x1 && code == SQLITE_OK; x++) {
-        snprintf(path, sizeof path, "%s/%d/%d", job->folder, z, (int)x);
+        snprintf(path, sizeof path, "%s/%s%d/%d", job->folder, folder, z, (int)x);
         code = make_folder(path, error);
     }
     return code;
 }
 
-static int list_pieces(pyramid *p, tiles *t, int last, int64_t *all, char **error) {
-    size_t capacity = 0;
-    int code = SQLITE_OK;
-    for (int z = p->job->first; z <= last && code == SQLITE_OK; z++) {
+static int list_series(pyramid *p, tiles *t, int series, size_t *capacity, int64_t *all, char **error) {
+    const tiles_job *job = p->job;
+    char path[MOST_PATH];
+    snprintf(path, sizeof path, "%s/%s", job->folder, job->kind->series[series].folder);
+    int code = make_folder(path, error);
+    for (int z = job->first; z <= p->last && code == SQLITE_OK; z++) {
         const tile_range *ranges;
         size_t count;
-        code = tiles_available(t, z, &ranges, &count, error);
+        code = tiles_available(t, series, z, &ranges, &count, error);
         for (size_t i = 0; i < count && code == SQLITE_OK; i++) {
-            code = make_folders(p->job, z, &ranges[i], error);
-            if (code == SQLITE_OK) code = add_pieces(p, z, &ranges[i], &capacity, all);
+            code = make_folders(job, series, z, &ranges[i], error);
+            if (code == SQLITE_OK) code = add_pieces(p, series, z, &ranges[i], capacity, all);
         }
     }
+    return code;
+}
+
+static int list_pieces(pyramid *p, tiles *t, int64_t *all, char **error) {
+    size_t capacity = 0;
+    int code = SQLITE_OK;
+    for (int series = 0; series < p->job->kind->series_count && code == SQLITE_OK; series++)
+        code = list_series(p, t, series, &capacity, all, error);
     return code;
 }
 
@@ -283,28 +297,30 @@ static int claim_folder(const tiles_job *job, const char *description, int *file
         job->folder);
 }
 
-static int write_layer(tiles *t, const tiles_job *job, int last, char **error) {
+static int write_document(tiles *t, const tiles_job *job, int last, char **error) {
     char path[MOST_PATH];
-    tile_bytes layer;
-    snprintf(path, sizeof path, "%s/layer.json", job->folder);
-    int code = tiles_layer(t, job->first, last, &layer, error);
-    if (code == SQLITE_OK) code = write_file(path, layer.bytes, layer.size, error);
-    sqlite3_free(layer.bytes);
+    tile_bytes document;
+    snprintf(path, sizeof path, "%s/%s", job->folder, job->kind->document);
+    int code = tiles_document(t, "", job->first, last, &document, error);
+    if (code == SQLITE_OK) code = write_file(path, document.bytes, document.size, error);
+    sqlite3_free(document.bytes);
     return code;
 }
 
 static int write_all(pyramid *p, tiles *t, tiles_report *report, char **error) {
     const tiles_job *job = p->job;
     int file = -1;
-    p->last = job->last < t->plan->finest ? job->last : t->plan->finest;
+    const int finest = tiles_finest(t);
+    p->last = job->last < finest ? job->last : finest;
     if (strlen(job->folder) > MOST_PATH - 64) return tiles_fail(error, "the folder's name is too long");
-    if (job->first > p->last)
-        return tiles_fail(error, "terrain %s has levels 0 to %d", t->terrain->name, t->plan->finest);
+    if (job->first > p->last) return tiles_fail(error, "terrain %s has levels 0 to %d", t->terrain->name, finest);
+    if (job->kind->is_whole && (job->first > 0 || p->last < finest))
+        return tiles_fail(error, "%s has all levels, 0 to %d, or none", job->kind->name, finest);
     p->description = describe_job(job, t, p->last);
     int code = p->description ? claim_folder(job, p->description, &file, error) : SQLITE_NOMEM;
-    if (code == SQLITE_OK) code = list_pieces(p, t, p->last, &report->tiles, error);
+    if (code == SQLITE_OK) code = list_pieces(p, t, &report->tiles, error);
     if (code == SQLITE_OK) code = run_workers(p, report->tiles, error);
-    if (code == SQLITE_OK) code = write_layer(t, job, p->last, error);
+    if (code == SQLITE_OK) code = write_document(t, job, p->last, error);
     report->written = p->written;
     report->bytes = p->bytes;
     report->finest = p->last;
@@ -321,7 +337,7 @@ int tiles_write(const tiles_job *job, tiles_report *report, char **error) {
     sqlite3 *db = job->connect(job->context);
     if (!db) return SQLITE_CANTOPEN;
     int code = tiles_open(db, &t);
-    if (code == SQLITE_OK) code = tiles_begin(t, job->terrain, error);
+    if (code == SQLITE_OK) code = tiles_begin(t, job->kind, job->terrain, error);
     if (code == SQLITE_OK) {
         code = write_all(&p, t, report, error);
         tiles_end(t);

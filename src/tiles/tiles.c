@@ -1,7 +1,83 @@
-/* tiles.c - a connection's tiles: the terrain that is meant, its plan, one tile at a time. */
+/* tiles.c - kinds of tiles; a connection's tiles: the terrain that is meant, and what its kind has worked out of
+ * it. */
 #include "internal.h"
 
+#include <cjson/cJSON.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
 #include <string.h>
+
+const tile_kind *const tile_kinds[] = {&quantized_mesh, NULL};
+
+const tile_kind *tiles_kind(const char *name) {
+    for (const tile_kind *const *kind = tile_kinds; *kind; kind++)
+        if (strcmp((*kind)->name, name) == 0) return *kind;
+    return NULL;
+}
+
+/* ------------------------------------------------------------------------------------ what kinds have in common --
+ */
+
+int tiles_fail(char **error, const char *format, ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    char *text = sqlite3_vmprintf(format, arguments);
+    va_end(arguments);
+    sqlite3_free(*error);
+    *error = text;
+    return text ? SQLITE_ERROR : SQLITE_NOMEM;
+}
+
+int tiles_fail_database(char **error, sqlite3 *db, int code) {
+    const int failed = tiles_fail(error, "%s", sqlite3_errmsg(db));
+    return failed == SQLITE_NOMEM ? failed : code;
+}
+
+int tiles_check_place(const store_terrain *t, char **error) {
+    if (t->lonlat && t->wgs84 && t->placement.dx > 0 && t->placement.dy < 0) return SQLITE_OK;
+    return tiles_fail(error, "terrain %s has no tiles: they are of terrains in longitude and latitude on WGS 84",
+                      t->name);
+}
+
+int tiles_check_heights(const store_terrain *t, bool *is_above_geoid, char **error) {
+    *is_above_geoid = sqlite3_strlike("%EGM96%", t->vertical, 0) == 0;
+    if (*is_above_geoid || !t->vertical[0] || sqlite3_strlike("%ellipsoid%", t->vertical, 0) == 0) return SQLITE_OK;
+    return tiles_fail(error,
+                      "terrain %s has no tiles: its heights are \"%s\", and only those above the ellipsoid and "
+                      "above EGM96 can be placed in space",
+                      t->name, t->vertical);
+}
+
+geo_extent tiles_extent(const store_terrain *t) {
+    const rqt_placement *at = &t->placement;
+    const double low = rqt_unit_metres(&t->unit, t->min_q), high = rqt_unit_metres(&t->unit, t->max_q);
+    return (geo_extent){.west = at->x0,
+                        .east = at->x0 + (t->lattice.width - 1) * at->dx,
+                        .south = at->y0 + (t->lattice.height - 1) * at->dy,
+                        .north = at->y0,
+                        .lon_step = at->dx,
+                        .lat_step = -at->dy,
+                        .lowest = fmin(low, high),
+                        .highest = fmax(low, high)};
+}
+
+int tiles_print(cJSON *document, tile_bytes *out) {
+    char *text = cJSON_PrintUnformatted(document);
+    const size_t size = text ? strlen(text) : 0;
+    *out = (tile_bytes){.bytes = text ? sqlite3_malloc64(size + 1) : NULL};
+    if (out->bytes) {
+        memcpy(out->bytes, text, size);
+        out->bytes[size] = '\n';
+        out->size = size + 1;
+    }
+    cJSON_free(text);
+    cJSON_Delete(document);
+    return out->bytes ? SQLITE_OK : SQLITE_NOMEM;
+}
+
+/* ------------------------------------------------------------------------------------------------- a connection --
+ */
 
 int tiles_open(sqlite3 *db, tiles **out) {
     tiles *t = sqlite3_malloc(sizeof *t);
@@ -16,9 +92,14 @@ int tiles_open(sqlite3 *db, tiles **out) {
     return code;
 }
 
+static void forget(kept_plan *kept) {
+    if (kept->plan) kept->kind->functions->plan_free(kept->plan);
+    *kept = (kept_plan){0};
+}
+
 void tiles_close(tiles *t) {
     if (!t) return;
-    for (int i = 0; i < KEPT_PLANS; i++) plan_free(t->kept[i]);
+    for (int i = 0; i < KEPT_PLANS; i++) forget(&t->kept[i]);
     store_close(t->store);
     sqlite3_free(t);
 }
@@ -31,22 +112,26 @@ void tiles_limit(tiles *t, int64_t triangles) {
 static int find_plan(tiles *t, char **error) {
     const uint64_t state = store_state(t->store);
     for (int i = 0; i < KEPT_PLANS; i++) {
-        tile_plan *plan = t->kept[i];
-        if (!plan || !state || plan->state != state || strcmp(plan->name, t->terrain->name) != 0) continue;
-        t->plan = plan;
+        const kept_plan *kept = &t->kept[i];
+        if (kept->kind != t->kind || !state || kept->state != state) continue;
+        if (strcmp(kept->name, t->terrain->name) != 0) continue;
+        t->plan = kept->plan;
         return SQLITE_OK;
     }
-    plan_free(t->kept[t->next]);
-    t->kept[t->next] = NULL;
-    const int code = plan_create(t, state, &t->kept[t->next], error);
-    t->plan = t->kept[t->next];
-    if (code == SQLITE_OK) t->next = (t->next + 1) % KEPT_PLANS;
-    return code;
+    kept_plan *now = &t->kept[t->next];
+    forget(now);
+    const int code = t->kind->functions->plan_create(t, &t->plan, error);
+    if (code != SQLITE_OK) return code;
+    *now = (kept_plan){.kind = t->kind, .state = state, .plan = t->plan};
+    snprintf(now->name, sizeof now->name, "%s", t->terrain->name);
+    t->next = (t->next + 1) % KEPT_PLANS;
+    return SQLITE_OK;
 }
 
-int tiles_begin(tiles *t, const char *terrain, char **error) {
+int tiles_begin(tiles *t, const tile_kind *kind, const char *terrain, char **error) {
     int code = store_begin(t->store, error);
     if (code != SQLITE_OK) return code;
+    t->kind = kind;
     code = store_find(t->store, terrain, &t->terrain, error);
     if (code == SQLITE_OK) code = find_plan(t, error);
     if (code != SQLITE_OK) tiles_end(t);
@@ -54,22 +139,31 @@ int tiles_begin(tiles *t, const char *terrain, char **error) {
 }
 
 void tiles_end(tiles *t) {
+    t->kind = NULL;
     t->terrain = NULL;
     t->plan = NULL;
     store_end(t->store);
 }
 
 int tiles_finest(const tiles *t) {
-    return t->plan->finest;
+    return t->kind->functions->finest(t);
 }
 
-int tiles_make(tiles *t, int z, int32_t x, int32_t y, tile_bytes *out, char **error) {
-    tile_place place;
-    tile_mesh mesh;
+int tiles_available(tiles *t, int series, int z, const tile_range **ranges, size_t *count, char **error) {
+    *ranges = NULL;
+    *count = 0;
+    if (z < 0 || z > tiles_finest(t)) return SQLITE_OK;
+    return t->kind->functions->available(t, series, z, ranges, count, error);
+}
+
+int tiles_document(tiles *t, const char *root, int first, int last, tile_bytes *out, char **error) {
+    const int finest = tiles_finest(t);
     *out = (tile_bytes){0};
-    if (!plan_place(t, z, x, y, &place) || place.turns == 0) return SQLITE_OK;
-    int code = mesh_make(t, &place, &mesh, error);
-    if (code == SQLITE_OK && mesh.cut.triangle_count > 0) code = encode_tile(t, &place, &mesh, out, error);
-    mesh_free(&mesh);
-    return code;
+    return t->kind->functions->document(t, root, first, last > finest ? finest : last, out, error);
+}
+
+int tiles_make(tiles *t, int series, int z, int32_t x, int32_t y, tile_bytes *out, char **error) {
+    *out = (tile_bytes){0};
+    if (z < 0 || z > tiles_finest(t) || x < 0 || y < 0) return SQLITE_OK;
+    return t->kind->functions->make(t, series, z, x, y, out, error);
 }

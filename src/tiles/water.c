@@ -82,7 +82,7 @@ size_t water_mask(const tiles *t, const tile_place *place, uint8_t mask[WATER_SI
         for (int j = 0; j < WATER_SIDE; j++) {
             const double row = floor(turn->north + (turn->south - turn->north) * (j + 0.5) / WATER_SIDE + 0.5);
             if (row < 0 || row >= t->terrain->lattice.height) continue;
-            mask_row(t->plan, t->terrain, turn, (int32_t)row, mask + j * WATER_SIDE);
+            mask_row(plan_of(t), t->terrain, turn, (int32_t)row, mask + j * WATER_SIDE);
         }
     }
     return memcmp(mask, mask + 1, WATER_SIDE * WATER_SIDE - 1) == 0 ? 1 : WATER_SIDE * WATER_SIDE;

@@ -5,7 +5,7 @@ PLAN, MESH, GLOBE, WATER, ENCODE, LAYER, PYRAMID = ("src/tiles/%s.c" % name for 
 
 MUTANTS = [
     # errors
-    ("tiles: the mesh is too coarse", MESH, "store_query(t->store, t->terrain, region, t->plan->level", "store_query(t->store, t->terrain, region, 1.5 * t->plan->level", TILES,
+    ("tiles: the mesh is too coarse", MESH, "region, plan_of(t)->level", "region, 1.5 * plan_of(t)->level", TILES,
      "no sample is further above or below"),
     ("tiles: curvature takes nothing", PLAN, "if (status == RQT_OK) status = rqt_rule_set_lowering(plan->rule, lowering);", "", TILES, "africa: no sample is further from a tile in space"),
     ("tiles: vertices do not move", MESH, "mesh->error = eps + moved * (1 + 1e-9) + 1e-7;", "mesh->error = eps + 0 * moved;", TILES, "no sample is further from a tile in space"),
@@ -43,7 +43,7 @@ MUTANTS = [
     # to disk
     ("tiles: all is made again", PYRAMID, "if (stat(path, &there) == 0) return SQLITE_OK;", "(void)there;", TILES, "without making again"),
     ("tiles: anybody's folder will do", PYRAMID, "if ((size_t)n == size && memcmp(there, description, size) == 0) return SQLITE_OK;", "return SQLITE_OK;", TILES, "are not mixed in"),
-    ("tiles: gzip is not asked for", PYRAMID, "if (p->job->gzip) code = pack(&tile);", "", TILES, "all tiles are compressed"),
+    ("tiles: gzip is not asked for", PYRAMID, "if (p->job->gzip && !series->is_packed) code = pack(&tile);", "", TILES, "all tiles are compressed"),
     ("tiles: numbers of paths may begin with 0", "src/serve/endpoints.c", "|| (digits > 1 && *segment == '0')", "", TILES, "no tile at 00/1/0"),
     ("tiles: what is behind a number does not matter", "src/serve/endpoints.c", "return strlen(segment + digits) == rest && memcmp(segment + digits, close + 1, rest) == 0;", "return rest + 1 > 0;", TILES,
      "no tile at 0/1/0x"),

@@ -1,0 +1,74 @@
+/* tiles.c - tiles for globes and maps, as the room tiles makes them: the document of a kind, and one tile at a
+ * time. The same bytes as `rqt tiles` writes, all extensions in them: clients pass over what they have not asked
+ * for.
+ *
+ * Paths are /collections/{terrain}/tiles/KIND/DOCUMENT and /collections/{terrain}/tiles/KIND/FOLDER z/x/y SUFFIX;
+ * the table of endpoints has one row for each, whose words stand here for what they name.
+ */
+#include "internal.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+enum { KIND = 3, TILE_SEGMENTS = 7 }; /* a path with a folder has one more */
+
+/* What the room tiles was asked for, as the answer; code is its own. */
+static void finish(request *r, const terrain *t, const tile_kind *kind, int code, char *sentence,
+                   tile_bytes *bytes) {
+    if (code != SQLITE_OK)
+        database_failed(t->database, r, code, sentence ? sentence : sqlite3_errstr(code));
+    else if (bytes->size == 0)
+        answer_problem(r, MHD_HTTP_NOT_FOUND, "the terrain has no such tile; %s tells which there are",
+                       kind->document);
+    else
+        buffer_add(&r->answer.body, bytes->bytes, bytes->size);
+    sqlite3_free(bytes->bytes);
+    sqlite3_free(sentence);
+}
+
+/* "content/" of .../tiles/KIND/content/{z}/{x}/{y}. */
+static int series_of(const request *r, const tile_kind *kind) {
+    for (int i = 0; i < kind->series_count; i++) {
+        const char *folder = kind->series[i].folder, *segment = r->segments[KIND + 1];
+        const size_t n = strlen(folder);
+        if (r->segment_count == TILE_SEGMENTS ? n == 0
+                                              : n > 0 && strncmp(folder, segment, n - 1) == 0 && !segment[n - 1])
+            return i;
+    }
+    return 0;
+}
+
+static int make(tiles *t, const request *r, int series, tile_bytes *out, char **error) {
+    const char *const *place = r->segments + r->segment_count - 3;
+    if (series < 0) return tiles_document(t, "", 0, tiles_finest(t), out, error);
+    return tiles_make(t, series, atoi(place[0]), atoi(place[1]), atoi(place[2]), out, error);
+}
+
+/* series < 0: the document. */
+static void answer_series(worker *w, request *r, const tile_kind *kind, int series) {
+    const char *type = series < 0 ? "application/json" : kind->series[series].media_type;
+    const bool is_packed = series >= 0 && kind->series[series].is_packed;
+    terrain t;
+    if (!terrain_begin(w, r, &t)) return;
+    tiles *all = endpoint_represent(r, t.state, type, is_packed, false) ? database_tiles(t.database, r) : NULL;
+    if (all) {
+        tile_bytes bytes = {0};
+        char *sentence = NULL;
+        int code = tiles_begin(all, kind, r->terrain, &sentence);
+        if (code == SQLITE_OK) {
+            code = make(all, r, series, &bytes, &sentence);
+            tiles_end(all);
+        }
+        finish(r, &t, kind, code, sentence, &bytes);
+    }
+    terrain_end(&t);
+}
+
+void answer_tile_document(worker *w, request *r) {
+    answer_series(w, r, tiles_kind(r->segments[KIND]), -1);
+}
+
+void answer_tile(worker *w, request *r) {
+    const tile_kind *kind = tiles_kind(r->segments[KIND]);
+    answer_series(w, r, kind, series_of(r, kind));
+}
