@@ -25,11 +25,16 @@ without() {
     exit 0
 }
 
+# Cesium's sources have checks for developers, between marks, that its own releases come without; and so does this.
+strip() {
+    find "$1" -name '*.js' -exec sed -i '/^ *\/\/>>includeStart(.debug/,/^ *\/\/>>includeEnd(.debug/d' {} +
+}
 command -v node >/dev/null 2>&1 && command -v npm >/dev/null 2>&1 || without "node or npm is missing (Debian: nodejs, npm)"
 if ! cmp -s "$here/package-lock.json" "$packages/installed.json"; then
     cp "$here/package.json" "$here/package-lock.json" "$here/.npmrc" "$packages/"
     (cd "$packages" && npm ci --ignore-scripts --no-audit --no-fund >npm.log 2>&1) ||
         without "npm cannot install @cesium/engine and esbuild ($packages/npm.log)"
+    strip "$packages/node_modules/@cesium/engine/Source"
     cp "$here/package-lock.json" "$packages/installed.json"
 fi
 # Modules are looked for beside the packages, so that none need lie in the source tree. Each worker is one file, as a

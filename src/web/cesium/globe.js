@@ -10,9 +10,10 @@ import {
     Matrix4, Scene, SkyAtmosphere, TaskProcessor, Transforms, buildModuleUrl, sampleTerrain, sampleTerrainMostDetailed,
 } from '@cesium/engine';
 import {LAND, SEA, colourAt} from '../ramps.js';
+import {askLayer, tilesPath} from '../service.js';
 
 const LIGHT = [-1, 1, 1.1]; // where it comes from: east, north, up
-const CEILING = 3; // a terrain's tile may be off by so many pixels
+const PIXELS = 2; // that a tile may be off
 const SHADES = 1024; // of the ramp of heights
 const SEA_BED = 400; // metres below the ellipsoid, or the terrain: where the globe is that has no terrain
 
@@ -59,12 +60,6 @@ function spacingOf([lowest, highest]) {
     return power * [1, 2, 5, 10].find(step => step * power >= wanted);
 }
 
-/** The most that the tiles of each level are off, as its layer.json says. */
-async function levelsOf(url) {
-    const {geometricErrors, available, attribution} = await (await fetch(`${url}/layer.json`)).json();
-    return {errors: geometricErrors, finest: available.length - 1, attribution};
-}
-
 export class TerrainGlobe {
     /**
      * @param stage {canvas, credits, lightbox}: elements
@@ -72,9 +67,8 @@ export class TerrainGlobe {
      */
     static async create(stage, terrain) {
         settle();
-        const url = `collections/${encodeURIComponent(terrain.id)}/tiles/quantized-mesh`;
-        const levels = await levelsOf(url);
-        const provider = await CesiumTerrainProvider.fromUrl(url, {requestVertexNormals: true, requestMetadata: true, credit: levels.attribution});
+        const {geometricErrors: errors, maxzoom: finest} = await askLayer(terrain.id), levels = {errors, finest};
+        const provider = await CesiumTerrainProvider.fromUrl(tilesPath(terrain.id), {requestVertexNormals: true});
         return new TerrainGlobe(stage, terrain, provider, levels);
     }
 
@@ -96,14 +90,14 @@ export class TerrainGlobe {
         scene.light = new DirectionalLight({direction: Cartesian3.negate(Cartesian3.normalize(from, from), from), intensity: 1.6});
         Object.assign(globe, {
             enableLighting: true, dynamicAtmosphereLighting: false, lambertDiffuseMultiplier: 0.85, vertexShadowDarkness: 0.28, showWaterEffect: false,
-            depthTestAgainstTerrain: true, maximumScreenSpaceError: CEILING, showSkirts: false, baseColor: Color.WHITE, backFaceCulling: false,
+            depthTestAgainstTerrain: true, tileCacheSize: 400, maximumScreenSpaceError: PIXELS, baseColor: Color.WHITE, backFaceCulling: false,
         });
         globe.material = paint(heights, spacingOf(heights));
         // Where there is no terrain, a globe nonetheless.
         const below = Math.min(0, heights[0]) - SEA_BED, {x, y, z} = globe.ellipsoid.radii;
         scene.primitives.add(new EllipsoidPrimitive({
             radii: new Cartesian3(x + below, y + below, z + below),
-            material: Material.fromType('Color', {color: Color.fromCssColorString('#33404d')}),
+            material: Material.fromType('Color', {color: Color.fromCssColorString('#4b5b69')}),
         }));
         Object.assign(this, {scene, globe});
         provider.errorEvent.addEventListener(({message}) => this.onProblem?.(message));
@@ -145,9 +139,9 @@ export class TerrainGlobe {
         this.scene.requestRender();
     }
 
-    /** {finest, coarsest}: levels of the tiles in the picture; undefined: none yet. */
+    /** {finest, coarsest}: levels that the tiles in the picture are of, or were cut from; undefined: none yet. */
     shownLevels() {
-        const shown = this.globe._surface._tilesToRender.map(({level}) => level);
+        const shown = this.globe._surface._tilesToRender.map(({level}) => Math.min(level, this.levels.finest));
         return shown.length ? {finest: Math.max(...shown), coarsest: Math.min(...shown)} : undefined;
     }
 
@@ -170,9 +164,9 @@ export class TerrainGlobe {
      * the finest ones that there are (level undefined); null where the tiles have no terrain.
      */
     async sample(places, level) {
-        const at = places.map(([longitude, latitude]) => Cartographic.fromDegrees(longitude, latitude));
+        const at = places.map(([longitude, latitude]) => Cartographic.fromDegrees(longitude, latitude, NaN));
         await (level === undefined ? sampleTerrainMostDetailed(this.provider, at) : sampleTerrain(this.provider, level, at));
-        return at.map(({height}) => height ?? null);
+        return at.map(({height}) => Number.isFinite(height) ? height : null);
     }
 
     /** The place under CSS pixels of the canvas: {longitude, latitude, height}, or null. */

@@ -9,6 +9,7 @@
 //   settled()          Promise, kept when every tile that the picture needs is in it
 //   sample(places, z)  Promise of heights above the ellipsoid, of level z or of the finest that there is (Cesium's sampleTerrain)
 //   pick(x, y)         {longitude, latitude, height} under CSS pixels, or null
+//   globe              the TerrainGlobe (globe.js)
 
 import {metres} from '../format.js';
 import {askTerrains} from '../service.js';
@@ -136,7 +137,6 @@ class Page {
     }
 
     hook() {
-        window.G = this.globe;
         const {globe, flight, settings} = this;
         return {
             state: () => ({terrain: this.terrain.id, camera: globe.camera, ...settings, levels: globe.shownLevels(), errors: globe.levels.errors}),
@@ -146,6 +146,7 @@ class Page {
             settled: () => globe.settled(),
             sample: (places, level) => globe.sample(places, level),
             pick: (x, y) => globe.pick(x, y),
+            globe,
         };
     }
 }
