@@ -2,8 +2,9 @@
 
 const ROUND = 90; // seconds
 const GRID = 24; // places a side where the summit is looked for
-const STEEP = 22; // degrees that the eye looks down
-const METRES = 111320; // of a degree of latitude
+const STEEP = Math.tan(22 * Math.PI / 180); // height above the summit by distance
+const EARTH = 6371000; // metres
+const METRES = EARTH * Math.PI / 180; // of a degree of latitude
 
 /** Places over the terrain, half a step from its borders. */
 function gridOf([west, south, east, north]) {
@@ -33,10 +34,12 @@ export class Flight {
     cameraAt(share, exaggeration) {
         const angle = 2 * Math.PI * share, {centre: [longitude, latitude], radius} = this;
         const north = radius * Math.cos(angle) / METRES, east = radius * Math.sin(angle) / METRES / Math.max(Math.cos(latitude * Math.PI / 180), 0.05);
-        const above = radius * Math.tan(STEEP * Math.PI / 180);
+        const top = Math.max(this.height, 0) * exaggeration, height = top + radius * STEEP, turn = radius / EARTH;
+        // Down to the summit, beyond what the Earth is round.
+        const pitch = -Math.atan2(EARTH + height - (EARTH + top) * Math.cos(turn), (EARTH + top) * Math.sin(turn)) * 180 / Math.PI;
         return {
-            longitude: longitude + east, latitude: Math.min(Math.max(latitude + north, -89.9), 89.9),
-            height: Math.max(this.height, 0) * exaggeration + above, heading: (share * 360 + 180) % 360, pitch: -STEEP,
+            longitude: (longitude + east + 540) % 360 - 180, latitude: Math.min(Math.max(latitude + north, -89.9), 89.9), height,
+            heading: (share * 360 + 180) % 360, pitch,
         };
     }
 

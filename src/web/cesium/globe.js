@@ -60,6 +60,15 @@ function spacingOf([lowest, highest]) {
     return power * [1, 2, 5, 10].find(step => step * power >= wanted);
 }
 
+/**
+ * {finest, errors}: how far the tiles of each level may be from the samples, metres. Of all but the last that is what clients take
+ * them to be off; the last is as fine as the terrain, but for what rounding moves, which is less than in the one before.
+ */
+function levelsOf({geometricErrors: errors, eps, maxzoom: finest}) {
+    if (finest > 0) errors[finest] = Math.min(errors[finest], eps[finest] + errors[finest - 1] - eps[finest - 1]);
+    return {errors, finest};
+}
+
 export class TerrainGlobe {
     /**
      * @param stage {canvas, credits, lightbox}: elements
@@ -67,7 +76,7 @@ export class TerrainGlobe {
      */
     static async create(stage, terrain) {
         settle();
-        const {geometricErrors: errors, maxzoom: finest} = await askLayer(terrain.id), levels = {errors, finest};
+        const levels = levelsOf(await askLayer(terrain.id));
         const provider = await CesiumTerrainProvider.fromUrl(tilesPath(terrain.id), {requestVertexNormals: true});
         return new TerrainGlobe(stage, terrain, provider, levels);
     }

@@ -53,6 +53,7 @@ class Page {
         element('home').onclick = () => this.home();
         element('exaggeration').oninput = event => this.set({exaggeration: Number(event.target.value)});
         for (const id of ['contours', 'wires']) element(id).onchange = event => this.set({[id]: event.target.checked});
+        element('more').open = !matchMedia('(max-width: 520px)').matches;
         element('dismiss').onclick = () => { element('problem').hidden = true; };
         // Whoever takes hold of the globe flies no more.
         for (const kind of ['pointerdown', 'wheel']) globe.canvas.addEventListener(kind, () => this.set({fly: false}), {passive: true});
