@@ -132,11 +132,11 @@ def listed(layer):
 
 
 def told_by(roots):
-    """Every tile that those of level 0 tell of, each of its own half of the globe: z,x,y."""
+    """Every tile that those of level 0 tell of: z,x,y; -1,x,y when it is in the other half of the globe."""
     found = []
     for half, root in roots.items():
         for z, ranges in enumerate(root.metadata["available"], 1):
-            found += [(z, x, y) if x >> z == half else ("not below", half, z, x, y) for r in ranges
+            found += [(z if x >> z == half else -1, x, y) for r in ranges
                       for y in range(r["startY"], r["endY"] + 1) for x in range(r["startX"], r["endX"] + 1)]
     return found
 

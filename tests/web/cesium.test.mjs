@@ -273,6 +273,9 @@ test('keys and the address: a view is loaded again as it was', keepingShots('ces
     const found = await state(again);
     assert.deepEqual([found.contours, found.wires, found.exaggeration, found.fly], [true, true, 2, false]);
     for (const key of ['longitude', 'latitude', 'heading', 'pitch']) assert.ok(Math.abs(found.camera[key] - camera[key]) < 0.02, `${key}: ${found.camera[key]}, ${camera[key]}`);
+    // Another terrain is looked at from its own place.
+    await Promise.all([again.page.waitForURL(/terrain=world/), again.page.selectOption('#terrain', 'world')]);
+    await again.until(async () => window.rqtCesium && await window.rqtCesium.ready && window.rqtCesium.state(), seen => seen.terrain === 'world' && seen.camera.height > 1e5 && !seen.wires);
     for (const page of [view, again]) {
         assert.deepEqual(page.problems, []);
         await page.close();

@@ -33,7 +33,7 @@ const isOnGlobe = ({terrain}) => terrain.lonlat && terrain.semi_major === WGS84.
 
 function listTerrains(terrains, chosen) {
     element('terrain').replaceChildren(...terrains.map(({id}) => new Option(id, id, id === chosen, id === chosen)));
-    element('terrain').onchange = event => { location.search = `terrain=${encodeURIComponent(event.target.value)}`; };
+    element('terrain').onchange = event => { location.href = `cesium?terrain=${encodeURIComponent(event.target.value)}`; };
     element('viewer').href = `./#terrain=${encodeURIComponent(chosen)}`;
     document.title = `${chosen} \u2013 rqt, Cesium`;
 }
