@@ -30,7 +30,7 @@ const endpoint endpoints[] = {
     {"explain", TERRAIN "/explain", REGION "eps! " OPTION_NAMES, answer_explain, false},
     {"area", TERRAIN "/area", REGION "eps! " OPTION_NAMES, answer_area, false},
     {"layer", TERRAIN "/tiles/quantized-mesh/layer.json", " ", answer_tile_document, false},
-    {"tile", TERRAIN "/tiles/quantized-mesh/{z}/{x}/{y}.terrain", " ", answer_tile, false},
+    {"tile", TERRAIN "/tiles/quantized-mesh/{z}/{x}/{y}.terrain", " extensions v ", answer_tile, false},
     {"cesium", "/cesium", " terrain ", answer_cesium, false},
     {"health", "/healthz", " ", answer_health, true},
     {"metrics", "/metrics", " ", answer_metrics, true},
