@@ -31,6 +31,7 @@ const endpoint endpoints[] = {
     {"area", TERRAIN "/area", REGION "eps! " OPTION_NAMES, answer_area, false},
     {"layer", TERRAIN "/tiles/quantized-mesh/layer.json", " ", answer_tile_document, false},
     {"tile", TERRAIN "/tiles/quantized-mesh/{z}/{x}/{y}.terrain", " extensions v ", answer_tile, false},
+    {"cesium", "/cesium", " terrain ", answer_cesium, false},
     {"terrarium", TERRAIN "/tiles/terrarium/tile.json", " ", answer_tile_document, false},
     {"terrarium_tile", TERRAIN "/tiles/terrarium/{z}/{x}/{y}.png", " ", answer_tile, false},
     {"health", "/healthz", " ", answer_health, true},
@@ -133,9 +134,9 @@ static uint64_t add_text(uint64_t hash, const char *text) {
 
 bool endpoint_represent(request *r, uint64_t state, const char *type, bool packed, bool by_accept) {
     answer *a = &r->answer;
-    if (packed)
-        a->coding = CODING_IDENTITY;
-    else if (!negotiate_coding(r->accept_encoding, &a->coding)) {
+    if (packed) a->coding = CODING_IDENTITY;
+    /* zstd is quicker and smaller, unless gzip is at hand. */
+    else if (!negotiate_coding(r->accept_encoding, a->is_gzipped ? CODING_GZIP : CODING_ZSTD, &a->coding)) {
         answer_problem(r, MHD_HTTP_NOT_ACCEPTABLE,
                        "answers are zstd, gzip, or as they are: Accept-Encoding takes none");
         return false;
