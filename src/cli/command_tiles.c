@@ -17,6 +17,7 @@ static const char HELP[] =
     "\n"
     "Kinds:\n"
     "  quantized-mesh       z/x/y.terrain, layer.json: Cesium and other globes\n"
+    "  terrarium            z/x/y.png, tile.json: MapLibre, deck.gl and other maps; heights as they are\n"
     "\n"
     "Options:\n"
     "  -o, --output FOLDER  made if it is not there\n"

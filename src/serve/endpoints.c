@@ -32,6 +32,8 @@ const endpoint endpoints[] = {
     {"layer", TERRAIN "/tiles/quantized-mesh/layer.json", " ", answer_tile_document, false},
     {"tile", TERRAIN "/tiles/quantized-mesh/{z}/{x}/{y}.terrain", " extensions v ", answer_tile, false},
     {"cesium", "/cesium", " terrain ", answer_cesium, false},
+    {"terrarium", TERRAIN "/tiles/terrarium/tile.json", " ", answer_tile_document, false},
+    {"terrarium_tile", TERRAIN "/tiles/terrarium/{z}/{x}/{y}.png", " ", answer_tile, false},
     {"health", "/healthz", " ", answer_health, true},
     {"metrics", "/metrics", " ", answer_metrics, true},
     {"page", "/{file}", " ", NULL, false},
