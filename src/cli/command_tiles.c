@@ -17,6 +17,7 @@ static const char HELP[] =
     "\n"
     "Kinds:\n"
     "  quantized-mesh       z/x/y.terrain, layer.json: Cesium and other globes\n"
+    "  3d-tiles             content/level/x/y.glb, subtrees/level/x/y.subtree, tileset.json: 3D Tiles 1.1\n"
     "\n"
     "Options:\n"
     "  -o, --output FOLDER  made if it is not there\n"

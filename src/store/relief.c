@@ -64,3 +64,37 @@ int store_find_relief(store *s, const store_terrain *t, rqt_block_number number,
     relief->highest = fmin(relief->highest, own.highest);
     return SQLITE_OK;
 }
+
+/* Let X be the largest error finer than the grids of level l, and b a block of that level with em(b) = X > 0. Going
+ * down from b to children with the same em as long as there are any, one comes to a block with em = X whose
+ * children all have less, for at stride 1 em is 0: each of these answers from its own em up to below X. And no
+ * block below level l has a larger em_parent. So X is the largest end of an interval below level l: those that
+ * never answer need not be known. */
+int store_level_errors(store *s, const store_terrain *t, rqt_code *largest, char **error) {
+    const int levels = rqt_block_levels(&t->lattice, t->k);
+    sqlite3_stmt *row = NULL;
+    int64_t end[RQT_MAX_K + 2] = {0};
+    int code = store_begin_on(s, t, error);
+    if (code != SQLITE_OK) return code;
+    char *sql = sqlite3_mprintf("SELECT id, tol1 FROM \"%w\".rqt_index_%lld%s", t->schema, t->id, t->suffix);
+    code = sql ? sqlite3_prepare_v2(s->db, sql, -1, &row, NULL) : SQLITE_NOMEM;
+    sqlite3_free(sql);
+    while (code == SQLITE_OK && (code = sqlite3_step(row)) == SQLITE_ROW) {
+        const uint64_t number = (uint64_t)sqlite3_column_int64(row, 0);
+        const int level = number ? (63 - __builtin_clzll(number)) / 2 : 0;
+        const int64_t above = sqlite3_column_int64(row, 1) + 1;
+        code = SQLITE_OK;
+        if (level > 0 && level < levels && above <= RQT_CODE_LARGEST && above > end[level]) end[level] = above;
+    }
+    if (code == SQLITE_DONE)
+        code = SQLITE_OK;
+    else if (code != SQLITE_NOMEM)
+        code = store_fail_db(error, s->db, code, "reading the index");
+    sqlite3_finalize(row);
+    for (int l = levels - 1; l >= 0; l--) {
+        if (end[l + 1] > end[l]) end[l] = end[l + 1];
+        largest[l] = (rqt_code)end[l + 1];
+    }
+    store_end(s);
+    return code;
+}

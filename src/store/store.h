@@ -151,6 +151,10 @@ store_relief store_relief_of_all(const store_terrain *t);
 int store_find_relief(store *s, const store_terrain *t, rqt_block_number number, store_relief *relief,
                       char **error);
 
+/* largest[l], for each level l of blocks: no vertex finer than the grids of that level has a larger error (outline
+ * `tol`), and one has that. By the index alone, all of which is read. largest has room for RQT_MAX_K + 1. */
+int store_level_errors(store *s, const store_terrain *t, rqt_code *largest, char **error);
+
 /* How far check has come, and what it found: severity (so far always "error"), block 0 when it is not about one. */
 typedef struct store_finding {
     const char *severity;

@@ -2,6 +2,8 @@
  *
  *   quantized-mesh  quantized-mesh 1.0 (CesiumGS/quantized-mesh), cut from the terrain's own mesh. Tiles are
  * squares of 180 / 2^z degrees, x from -180 degrees on, y from the south (TMS, global geodetic).
+ *   3d-tiles        3D Tiles 1.1: an implicit tileset, glTF in geocentric coordinates. Tiles are the cells of the
+ * terrain's own blocks, x from the west, y from the south.
  *
  * A kind is one or more series of tiles, each with levels of ranges of them, and one document that tells clients of
  * them. The bytes of a tile are a function of the terrain alone: the service and the command give the same.
