@@ -27,12 +27,14 @@ typedef struct block_level {
 typedef struct block_plan {
     int finest;
     block_level level[TILES_LEVELS];
-    double sag[RQT_RANKS]; /* what curvature takes from a triangle, by the rank of its split vertex */
-    geo_frame *frame;      /* geocentric, geoid included */
-    geo_geoid geoid;       /* zeros without one */
+    double sag[RQT_RANKS + 2]; /* what curvature takes from a triangle, by the rank of its split vertex + 2: [1] is
+                                  that of half a square of one sample, which has none */
+    geo_frame *frame;          /* geocentric, geoid included */
+    geo_geoid geoid;           /* zeros without one */
     tile_range *ranges[BLOCK_SERIES][TILES_LEVELS]; /* NULL: not yet asked for */
     size_t range_count[BLOCK_SERIES][TILES_LEVELS];
 } block_plan;
+double block_sag(const block_plan *plan, int rank);
 int block_plan_create(tiles *t, void **plan, char **error);
 void block_plan_free(void *plan);
 static inline block_plan *block_plan_of(const tiles *t) {

@@ -28,8 +28,9 @@ static int make_rule(const tiles *t, block_tile tile, rqt_rule **rule) {
     const int32_t side = 1 << (terrain->lattice.K - tile.level);
     double lowering[RQT_RANKS];
     for (int rank = 0; rank < RQT_RANKS; rank++) {
-        const bool is_free = plan->sag[rank] + terrain->quantum_error <= error;
-        lowering[rank] = !is_free ? 2 * error + 1 : tile.level == plan->finest ? error : plan->sag[rank];
+        const double sag = block_sag(plan, rank);
+        const bool is_free = sag + terrain->quantum_error <= error;
+        lowering[rank] = !is_free ? 2 * error + 1 : tile.level == plan->finest ? error : sag;
     }
     rqt_status status = rqt_rule_create(&terrain->lattice, terrain->quantum_error, store_allocator(), rule);
     if (status == RQT_OK) status = rqt_rule_set_lowering(*rule, lowering);

@@ -13,7 +13,9 @@
  *     E(l) = quantum_error + B(l) + max( em(l + 2), min( em(l), stride(l) / 4 ) )
  *
  *     em(l)      the largest error of any vertex finer than the grid of blocks of level l: by the index
- *     B(l)       what curvature may take: as much as from a square of four strides, or half a quantum of heights
+ *     B(l)       what curvature may take: as much as from a quarter of a square of four strides, or half a quantum
+ *                of heights; on the last level from half a square of one sample, or 5 cm if that is less than the
+ *                first: sea and plain have no more triangles than they need
  *     stride(l)  metres between neighbours of that grid
  *
  * With em(l) alone the mesh of a tile is of its block's own grid. But em(l) is that of the worst place: a spike, a
@@ -40,20 +42,22 @@
 #define GEOID_HIGHEST 120.0 /* EGM96 lies between -107 and 86 */
 enum { FIRST_STEP = -13, STEP_BITS = 24, FINER = 2 };
 #define STRIDES_PER_ERROR 4
+#define FREE 0.05    /* metres */
 #define DOUBLES 1e-7 /* metres: doubles of places in space, a dozen operations */
 
-static double sag_at(const block_plan *plan, int rank) {
-    return plan->sag[rank < 0 ? 0 : rank >= RQT_RANKS ? RQT_RANKS - 1 : rank];
+double block_sag(const block_plan *plan, int rank) {
+    return plan->sag[rank < -1 ? 1 : rank >= RQT_RANKS ? RQT_RANKS + 1 : rank + 2];
 }
 
 static void set_error(const store_terrain *t, const double em[TILES_LEVELS + FINER], int l, block_plan *plan) {
     const int scale = t->lattice.K - t->k - l; /* of the stride */
     const double quantum = fabs(rqt_unit_factor(&t->unit)) / t->unit.d;
-    const double curved = fmax(quantum / 2, sag_at(plan, 2 * scale + 2));
+    const double wide = block_sag(plan, 2 * scale + 2), least = block_sag(plan, 2 * scale - 1);
+    const double curved = fmax(quantum / 2, l < plan->finest ? wide : fmax(least, fmin(wide, FREE)));
     const double ground = ldexp(t->cost.cell, scale) / STRIDES_PER_ERROR;
     const double terrain = l == plan->finest ? 0 : fmax(em[l + FINER], fmin(em[l], ground));
     plan->level[l].error = t->quantum_error + curved + terrain;
-    plan->level[l].centre = sag_at(plan, 2 * (t->lattice.K - l - 1) + 1);
+    plan->level[l].centre = block_sag(plan, 2 * (t->lattice.K - l - 1) + 1);
 }
 
 /* The longest that a tile can be in space. */
@@ -83,16 +87,18 @@ static void set_levels(const store_terrain *t, const rqt_code largest[RQT_MAX_K 
 static int make_frame(const store_terrain *t, bool is_above_geoid, block_plan *plan, char **error) {
     char why[256] = "";
     const geo_ellipsoid wgs84 = GEO_WGS84;
-    const geo_extent extent = tiles_extent(t);
+    geo_extent extent = tiles_extent(t);
     const int made = geo_frame_create(GEO_ECEF, &wgs84, 0, 0, is_above_geoid, &plan->frame, why, sizeof why);
     if (made != GEO_OK)
         return made == GEO_NO_MEMORY ? SQLITE_NOMEM
                                      : tiles_fail(error, "terrain %s has no tiles: %s", t->name, why);
-    geo_frame_sag(plan->frame, &extent, RQT_RANKS, plan->sag);
-    for (int rank = 0; rank < RQT_RANKS; rank++)
+    plan->geoid = geo_frame_geoid(plan->frame, &extent);
+    extent.lon_step /= 2; /* all ranks are two more in a grid of half the step */
+    extent.lat_step /= 2;
+    geo_frame_sag(plan->frame, &extent, RQT_RANKS + 2, plan->sag);
+    for (int rank = 0; rank < RQT_RANKS + 2; rank++)
         if (!isfinite(plan->sag[rank]))
             return tiles_fail(error, "terrain %s has no tiles: it is too large", t->name);
-    plan->geoid = geo_frame_geoid(plan->frame, &extent);
     return SQLITE_OK;
 }
 
