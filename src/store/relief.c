@@ -17,6 +17,9 @@
  *
  * And every vertex of the closed cell but its corners descends from C (core/summary.c): none has an error above e.
  *
+ * Nor, without the centre's outline bit, is either half mixed, or any triangle in it: all of their samples are
+ * valid or all are void, and as the halves have two corners in common, all of the cell's are alike.
+ *
  * Heights are widened by half a quantum, where samples were rounded to them, and by what doubles round away.
  *
  * Summaries are hostile. Whatever they say, a range lies in the one above and is not empty: where the two have
@@ -35,7 +38,7 @@ static void set_range(const store_terrain *t, double a, double b, double by, sto
 }
 
 store_relief store_relief_of_all(const store_terrain *t) {
-    store_relief all = {.error = t->max_error};
+    store_relief all = {.error = t->max_error, .is_mixed = t->voids > 0, .is_valid = t->voids == 0};
     set_range(t, rqt_unit_metres(&t->unit, t->min_q), rqt_unit_metres(&t->unit, t->max_q), 0, &all);
     return all;
 }
@@ -47,6 +50,10 @@ int store_find_relief(store *s, const store_terrain *t, rqt_block_number number,
     const int code = store_get_summary(s, t, number, &summary, error);
     if (code != SQLITE_OK) return code;
     if (summary->center_error < relief->error) relief->error = summary->center_error;
+    if (relief->is_mixed && !(summary->center_flags & RQT_OUTLINE)) {
+        relief->is_mixed = false;
+        relief->is_valid = summary->corner[0].flags & RQT_VALID;
+    }
     double low = INFINITY, high = -INFINITY;
     for (int c = 0; c < 4; c++) {
         if (!(summary->corner[c].flags & RQT_VALID)) return SQLITE_OK;

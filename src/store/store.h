@@ -143,6 +143,8 @@ typedef struct store_relief {
     double lowest,
         highest;    /* metres: no valid sample is beyond; of heights as they were before they were rounded */
     rqt_code error; /* no vertex but the square's corners has a larger one */
+    bool is_mixed;  /* there may be samples and voids in it; else is_valid tells which */
+    bool is_valid;
 } store_relief;
 /* Of the whole terrain. */
 store_relief store_relief_of_all(const store_terrain *t);

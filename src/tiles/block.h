@@ -49,12 +49,12 @@ typedef struct block_tile {
 block_tile block_tile_of(int level, int32_t x, int32_t y);
 /* Is its block stored? */
 bool block_exists(const tiles *t, block_tile tile);
-/* Has its mesh a triangle? The tile exists. */
-int block_has_content(tiles *t, block_tile tile, bool *has, char **error);
 /* What the index knows of a tile, given what it knows of the one above; of the whole terrain, for the root's. */
 int block_relief(tiles *t, block_tile tile, store_relief *relief, char **error);
 /* The same, from the root on. */
 int block_relief_from_root(tiles *t, block_tile tile, store_relief *relief, char **error);
+/* Has its mesh a triangle? The tile exists. */
+int block_has_content(tiles *t, block_tile tile, const store_relief *relief, bool *has, char **error);
 /* No valid sample in a kept leaf is further from the tile's mesh in space: metres. No tile below has a larger one.
  */
 double block_error(const tiles *t, block_tile tile, const store_relief *relief);

@@ -16,7 +16,9 @@
 #include <string.h>
 
 #define DEGREE 0.017453292519943295
-#define BEYOND_POLE (90 * (1 + 1e-9))
+#define BEYOND_POLE (90 * (1 + 1e-9)) /* a row at a pole, by a rounding */
+#define A 6378137.0
+#define F (1 / 298.257223563)
 enum { NORMAL_UNITS = 127 };
 
 /* ---------------------------------------------------------------------------------------------------- mesh -- */
@@ -69,57 +71,94 @@ int block_query(tiles *t, block_tile tile, int64_t most, rqt_patch *patch, char 
 
 /* ------------------------------------------------------------------------------------------------ in space -- */
 
-static int place_vertex(const tiles *t, const rqt_patch_vertex *v, double xyz[3], char **error) {
+/* Vertices have few columns and rows: the angle of each is kept for the next that has it. */
+enum { KEPT_ANGLES = 1024 };
+typedef struct angle {
+    int32_t number; /* of the column or row */
+    bool is_known;
+    double degrees, sine, cosine;
+} angle;
+typedef struct angles {
+    angle lon[KEPT_ANGLES], lat[KEPT_ANGLES];
+} angles;
+
+static const angle *find_angle(angle kept[KEPT_ANGLES], int32_t number, double degrees) {
+    angle *k = &kept[number % KEPT_ANGLES];
+    if (!k->is_known || k->number != number)
+        *k = (angle){number, true, degrees, sin(degrees * DEGREE), cos(degrees * DEGREE)};
+    return k;
+}
+
+static double latitude(const rqt_placement *at, int32_t row) {
+    const double degrees = at->y0 + row * at->dy;
+    return fabs(degrees) > 90 && fabs(degrees) <= BEYOND_POLE ? copysign(90, degrees) : degrees;
+}
+
+static int place_vertex(const tiles *t, const rqt_patch_vertex *v, const angle *lon, const angle *lat,
+                        double xyz[3], char **error) {
+    const double e2 = F * (2 - F), n = A / sqrt(1 - e2 * lat->sine * lat->sine);
+    const double place[3] = {lon->degrees, lat->degrees, rqt_unit_metres(&t->terrain->unit, v->q)};
+    const double height = geo_frame_height(block_plan_of(t)->frame, place);
+    xyz[0] = (n + height) * lat->cosine * lon->cosine;
+    xyz[1] = (n + height) * lat->cosine * lon->sine;
+    xyz[2] = (n * (1 - e2) + height) * lat->sine;
+    if (fabs(lat->degrees) <= 90 && isfinite(xyz[0]) && isfinite(xyz[1]) && isfinite(xyz[2])) return SQLITE_OK;
+    return tiles_fail(error, "terrain %s has no place in space at %.15g, %.15g", t->terrain->name, lon->degrees,
+                      lat->degrees);
+}
+
+/* From east, north, up at a place. */
+static void turn_normal(const angle *lon, const angle *lat, const float enu[3], int8_t out[3]) {
+    const double east = (double)enu[0], north = (double)enu[1], up = (double)enu[2];
+    const double outward = lat->cosine * up - lat->sine * north; /* from the axis */
+    out[0] = (int8_t)rint(NORMAL_UNITS * (lon->cosine * outward - lon->sine * east));
+    out[1] = (int8_t)rint(NORMAL_UNITS * (lon->sine * outward + lon->cosine * east));
+    out[2] = (int8_t)rint(NORMAL_UNITS * (lat->cosine * north + lat->sine * up));
+}
+
+static int place_all(const tiles *t, const float *enu, angles *known, double *xyz, block_mesh *mesh, char **error) {
     const rqt_placement *at = &t->terrain->placement;
-    double place[3] = {at->x0 + v->col * at->dx, at->y0 + v->row * at->dy,
-                       rqt_unit_metres(&t->terrain->unit, v->q)};
-    if (fabs(place[1]) > 90 && fabs(place[1]) <= BEYOND_POLE) place[1] = copysign(90, place[1]);
-    geo_frame_place(block_plan_of(t)->frame, place, xyz);
-    if (isfinite(xyz[0]) && isfinite(xyz[1]) && isfinite(xyz[2])) return SQLITE_OK;
-    return tiles_fail(error, "terrain %s has no place in space at %.15g, %.15g", t->terrain->name, place[0],
-                      place[1]);
+    int code = SQLITE_OK;
+    memset(known, 0, sizeof *known);
+    for (size_t i = 0; i < mesh->patch.vertex_count && code == SQLITE_OK; i++) {
+        const rqt_patch_vertex *v = &mesh->patch.vertices[i];
+        const angle *lon = find_angle(known->lon, v->col, at->x0 + v->col * at->dx),
+                    *lat = find_angle(known->lat, v->row, latitude(at, v->row));
+        code = place_vertex(t, v, lon, lat, xyz + 3 * i, error);
+        turn_normal(lon, lat, enu + 3 * i, mesh->normal + 3 * i);
+    }
+    return code;
 }
 
 /* xyz: of each vertex. */
 static void round_places(const double *xyz, size_t count, double step, block_mesh *mesh) {
     const double unit = fmax(step, 1);
-    double low[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, high[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
-    for (size_t i = 0; i < 3 * count; i++) {
-        low[i % 3] = fmin(low[i % 3], xyz[i]);
-        high[i % 3] = fmax(high[i % 3], xyz[i]);
+    for (int k = 0; k < 3; k++) {
+        double low = xyz[k], high = xyz[k];
+        for (size_t i = 1; i < count; i++) {
+            low = fmin(low, xyz[3 * i + (size_t)k]);
+            high = fmax(high, xyz[3 * i + (size_t)k]);
+        }
+        mesh->origin[k] = rint((low + high) / 2 / unit) * unit + 0.0;
+        for (size_t i = 0; i < count; i++)
+            mesh->offset[3 * i + (size_t)k] =
+                (int32_t)(rint(xyz[3 * i + (size_t)k] / step) - mesh->origin[k] / step);
     }
-    for (int k = 0; k < 3; k++) mesh->origin[k] = rint((low[k] + high[k]) / 2 / unit) * unit + 0.0;
-    for (size_t i = 0; i < 3 * count; i++)
-        mesh->offset[i] = (int32_t)(rint(xyz[i] / step) - mesh->origin[i % 3] / step);
-}
-
-static void turn_normal(const tiles *t, const rqt_patch_vertex *v, const float enu[3], int8_t out[3]) {
-    const rqt_placement *at = &t->terrain->placement;
-    const double lon = (at->x0 + v->col * at->dx) * DEGREE, lat = (at->y0 + v->row * at->dy) * DEGREE;
-    const double east = (double)enu[0], north = (double)enu[1], up = (double)enu[2];
-    const double outward = cos(lat) * up - sin(lat) * north; /* from the axis */
-    out[0] = (int8_t)rint(NORMAL_UNITS * (cos(lon) * outward - sin(lon) * east));
-    out[1] = (int8_t)rint(NORMAL_UNITS * (sin(lon) * outward + cos(lon) * east));
-    out[2] = (int8_t)rint(NORMAL_UNITS * (cos(lat) * north + sin(lat) * up));
 }
 
 static int place_mesh(tiles *t, block_tile tile, block_mesh *mesh, char **error) {
-    const rqt_patch *patch = &mesh->patch;
-    const size_t count = patch->vertex_count;
+    const size_t count = mesh->patch.vertex_count;
     double *xyz = sqlite3_malloc64(3 * count * sizeof *xyz);
-    float *normals = NULL;
+    angles *known = sqlite3_malloc64(sizeof *known);
+    float *enu = NULL;
     mesh->offset = sqlite3_malloc64(3 * count * sizeof *mesh->offset);
     mesh->normal = sqlite3_malloc64(3 * count * sizeof *mesh->normal);
-    int code = xyz && mesh->offset && mesh->normal ? SQLITE_OK : SQLITE_NOMEM;
-    for (size_t i = 0; i < count && code == SQLITE_OK; i++)
-        code = place_vertex(t, &patch->vertices[i], xyz + 3 * i, error);
-    if (code == SQLITE_OK) code = store_normals(t->store, t->terrain, patch, &normals, error);
-    if (code == SQLITE_OK) {
-        round_places(xyz, count, block_plan_of(t)->level[tile.level].step, mesh);
-        for (size_t i = 0; i < count; i++)
-            turn_normal(t, &patch->vertices[i], normals + 3 * i, mesh->normal + 3 * i);
-    }
-    sqlite3_free(normals);
+    int code = xyz && known && mesh->offset && mesh->normal ? SQLITE_OK : SQLITE_NOMEM;
+    if (code == SQLITE_OK) code = store_normals(t->store, t->terrain, &mesh->patch, &enu, error);
+    if (code == SQLITE_OK) code = place_all(t, enu, known, xyz, mesh, error);
+    if (code == SQLITE_OK) round_places(xyz, count, block_plan_of(t)->level[tile.level].step, mesh);
+    sqlite3_free(enu);
+    sqlite3_free(known);
     sqlite3_free(xyz);
     return code;
 }

@@ -10,7 +10,7 @@
  * what the Earth's curvature takes from flat triangles (geo_frame_sag), and where float heights were rounded by
  * quantum_error. The rule splits whatever would be off by more than the level's error,
  *
- *     E(l) = quantum_error + B(l) + max( em(l + 2), min( em(l), stride(l) / 4 ) )
+ *     E(l) = quantum_error + B(l) + max( em(l + 2), min( max( em(l + 1), em(l) / 4 ), stride(l) / 4 ) )
  *
  *     em(l)      the largest error of any vertex finer than the grid of blocks of level l: by the index
  *     B(l)       what curvature may take: as much as from a quarter of a square of four strides, or half a quantum
@@ -18,11 +18,13 @@
  *                first: sea and plain have no more triangles than they need
  *     stride(l)  metres between neighbours of that grid
  *
- * With em(l) alone the mesh of a tile is of its block's own grid. But em(l) is that of the worst place: a spike, a
- * cliff, and the outline of voids, whose error is ground, would make all of a level coarse. There the mesh goes on
- * to what is finer, but no further than the grid of the blocks two levels below: a tile has at most so many
- * vertices, whatever the terrain. The last level is the terrain: every vertex with an error is in, and the outline
- * of voids is exact. E does not grow from level to level, as em, B and strides do not.
+ * At em(l) the mesh of a tile is of its block's own grid. But em(l) is that of the worst place, and leaves a few
+ * per cent of the grid; a spike, a cliff, and the outline of voids, whose error is ground, would make all of a
+ * level coarse. So E is less, and in such places the mesh goes on to what is finer, as far as the grid of the
+ * blocks two levels below: a tile has at most so many vertices, whatever the terrain. (Measured on four real DEMs,
+ * tiles of 128 x 128 samples: 1000 to 5000 vertices a tile on all levels but the last.) The last level is the
+ * terrain: every vertex with an error is in, and the outline of voids is exact. E does not grow from level to
+ * level, as em, B and strides do not.
  *
  * em(l) only says what to ask for. That nothing is off by more than E(l) is what the rule sees to, block by block:
  * an index that lies changes how large tiles are, and not what is true.
@@ -42,6 +44,7 @@
 #define GEOID_HIGHEST 120.0 /* EGM96 lies between -107 and 86 */
 enum { FIRST_STEP = -13, STEP_BITS = 24, FINER = 2 };
 #define STRIDES_PER_ERROR 4
+#define PART_OF_WORST 4
 #define FREE 0.05    /* metres */
 #define DOUBLES 1e-7 /* metres: doubles of places in space, a dozen operations */
 
@@ -55,7 +58,8 @@ static void set_error(const store_terrain *t, const double em[TILES_LEVELS + FIN
     const double wide = block_sag(plan, 2 * scale + 2), least = block_sag(plan, 2 * scale - 1);
     const double curved = fmax(quantum / 2, l < plan->finest ? wide : fmax(least, fmin(wide, FREE)));
     const double ground = ldexp(t->cost.cell, scale) / STRIDES_PER_ERROR;
-    const double terrain = l == plan->finest ? 0 : fmax(em[l + FINER], fmin(em[l], ground));
+    const double own = fmin(fmax(em[l + 1], em[l] / PART_OF_WORST), ground);
+    const double terrain = l == plan->finest ? 0 : fmax(em[l + FINER], own);
     plan->level[l].error = t->quantum_error + curved + terrain;
     plan->level[l].centre = block_sag(plan, 2 * (t->lattice.K - l - 1) + 1);
 }

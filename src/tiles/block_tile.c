@@ -44,11 +44,11 @@ bool block_exists(const tiles *t, block_tile tile) {
     return rqt_block_locate(&t->terrain->lattice, t->terrain->k, number_of(tile), &place) == RQT_OK;
 }
 
-int block_has_content(tiles *t, block_tile tile, bool *has, char **error) {
-    const store_terrain *terrain = t->terrain;
+int block_has_content(tiles *t, block_tile tile, const store_relief *relief, bool *has, char **error) {
+    const rqt_lattice *lattice = &t->terrain->lattice;
     rqt_patch patch = {0};
-    *has = terrain->lattice.width > 1 && terrain->lattice.height > 1;
-    if (!*has || terrain->voids == 0) return SQLITE_OK;
+    *has = relief->is_valid && lattice->width > 1 && lattice->height > 1;
+    if (!relief->is_mixed) return SQLITE_OK;
     int code = block_query(t, tile, 1, &patch, error);
     *has = code == SQLITE_TOOBIG || patch.triangle_count > 0;
     if (code == SQLITE_TOOBIG) {

@@ -53,7 +53,7 @@ static block_tile tile_below(block_tile root, int depth, int m) {
 static int add_tile(tiles *t, block_tile tile, int place, store_relief *relief, subtree *s, char **error) {
     bool has_content;
     int code = block_relief(t, tile, relief, error);
-    if (code == SQLITE_OK) code = block_has_content(t, tile, &has_content, error);
+    if (code == SQLITE_OK) code = block_has_content(t, tile, relief, &has_content, error);
     if (code != SQLITE_OK) return code;
     s->error[s->tiles.count] = block_error(t, tile, relief);
     block_region(t, tile, relief, s->region + (size_t)REGION * (size_t)s->tiles.count);

@@ -46,8 +46,11 @@ static int add_range(range_list *list, tile_range range) {
 }
 
 static int is_available(tiles *t, int series, block_tile tile, bool *is_there, char **error) {
+    store_relief relief;
     *is_there = true;
-    return series == CONTENT ? block_has_content(t, tile, is_there, error) : SQLITE_OK;
+    if (series == SUBTREES) return SQLITE_OK;
+    const int code = block_relief_from_root(t, tile, &relief, error);
+    return code == SQLITE_OK ? block_has_content(t, tile, &relief, is_there, error) : code;
 }
 
 /* The tiles of a row up to column x1 that are there. */
