@@ -65,9 +65,10 @@ void block_region(const tiles *t, block_tile tile, const store_relief *relief, d
  * east across the antimeridian. */
 void block_rectangle(double west, double south, double east, double north, double region[4]);
 
-/* The mesh of a tile, to be released with store_keep; without a triangle where the tile has no content. At most
- * `most` triangles are looked for, 0: all; more are SQLITE_TOOBIG. */
-int block_query(tiles *t, block_tile tile, int64_t most, rqt_patch *patch, char **error);
+/* The mesh of a tile, to be released with store_keep; without a triangle where the tile has no content. part: 1, or
+ * of the north-western corner alone, its side so large a part of the tile's, a power of two. At most `most`
+ * triangles are looked for, 0: all; more are SQLITE_TOOBIG. */
+int block_query(tiles *t, block_tile tile, int32_t part, int64_t most, rqt_patch *patch, char **error);
 
 typedef struct block_mesh {
     rqt_patch patch;

@@ -42,10 +42,10 @@ static int make_rule(const tiles *t, block_tile tile, rqt_rule **rule) {
     return status == RQT_OK ? SQLITE_OK : SQLITE_NOMEM;
 }
 
-int block_query(tiles *t, block_tile tile, int64_t most, rqt_patch *patch, char **error) {
+int block_query(tiles *t, block_tile tile, int32_t part, int64_t most, rqt_patch *patch, char **error) {
     const block_plan *plan = block_plan_of(t);
     const int32_t side = 1 << (t->terrain->lattice.K - tile.level);
-    const rqt_square cell = {tile.i * side, tile.j * side, side};
+    const rqt_square cell = {tile.i * side, tile.j * side, side / part};
     store_limits *limits = store_limits_of(t->store);
     const int64_t before = limits->triangles;
     store_query_options options = {.select = RQT_SELECT_THRESHOLD,
@@ -165,7 +165,7 @@ static int place_mesh(tiles *t, block_tile tile, block_mesh *mesh, char **error)
 
 int block_mesh_make(tiles *t, block_tile tile, block_mesh *mesh, char **error) {
     *mesh = (block_mesh){0};
-    int code = block_query(t, tile, 0, &mesh->patch, error);
+    int code = block_query(t, tile, 1, 0, &mesh->patch, error);
     if (code == SQLITE_OK && mesh->patch.triangle_count > 0) code = place_mesh(t, tile, mesh, error);
     return code;
 }

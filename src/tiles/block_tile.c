@@ -23,6 +23,7 @@
 #include <math.h>
 
 #define DEGREE 0.017453292519943295
+enum { CORNER = 16 }; /* of a side, one part */
 /* A move of m metres changes a latitude by less than m / this radians, while that is small; else any is possible.
  */
 #define NARROW 4.0e6
@@ -44,12 +45,10 @@ bool block_exists(const tiles *t, block_tile tile) {
     return rqt_block_locate(&t->terrain->lattice, t->terrain->k, number_of(tile), &place) == RQT_OK;
 }
 
-int block_has_content(tiles *t, block_tile tile, const store_relief *relief, bool *has, char **error) {
-    const rqt_lattice *lattice = &t->terrain->lattice;
+/* Has the mesh a triangle in the north-western corner of the cell, its part-th part a side? */
+static int probe(tiles *t, block_tile tile, int32_t part, bool *has, char **error) {
     rqt_patch patch = {0};
-    *has = relief->is_valid && lattice->width > 1 && lattice->height > 1;
-    if (!relief->is_mixed) return SQLITE_OK;
-    int code = block_query(t, tile, 1, &patch, error);
+    int code = block_query(t, tile, part, 1, &patch, error);
     *has = code == SQLITE_TOOBIG || patch.triangle_count > 0;
     if (code == SQLITE_TOOBIG) {
         sqlite3_free(*error);
@@ -57,6 +56,17 @@ int block_has_content(tiles *t, block_tile tile, const store_relief *relief, boo
         code = SQLITE_OK;
     }
     store_keep(t->store, &patch);
+    return code;
+}
+
+/* A block is walked whole before it is asked whether that is enough: a corner takes less, and most have one. */
+int block_has_content(tiles *t, block_tile tile, const store_relief *relief, bool *has, char **error) {
+    const rqt_lattice *lattice = &t->terrain->lattice;
+    *has = relief->is_valid && lattice->width > 1 && lattice->height > 1;
+    if (!relief->is_mixed) return SQLITE_OK;
+    int code = SQLITE_OK;
+    for (int32_t part = CORNER; part > 0 && code == SQLITE_OK && !*has; part = part > 1 ? 1 : 0)
+        if (part <= 1 << (lattice->K - tile.level)) code = probe(t, tile, part, has, error);
     return code;
 }
 
