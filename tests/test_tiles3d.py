@@ -208,8 +208,12 @@ class Terrain:
         while self.side < max(self.height, self.width) - 1:
             self.side *= 2
         s.equal(name + ": rqt tiles says nothing in a pipe", s.run([s.RQT, "tiles", self.database, "--kind", "3d-tiles", "-o", self.folder]), ("", 0))
-        self.set = Tileset(reader(self.folder))
-        self.tiles = {place: Tile(data) for place, data in self.set.contents.items()}
+        try:
+            self.set = Tileset(reader(self.folder))
+            self.tiles = {place: Tile(data) for place, data in self.set.contents.items()}
+        except (AssertionError, LookupError, OSError, ValueError, struct.error) as error:
+            s.check(name + ": subtrees and tiles are as the formats have them, and what is listed is there", False, repr(error))
+            s.finish()
         self.space = {}
 
     def place(self, col, row):
@@ -374,6 +378,23 @@ def check_terrain(t, is_whole):
     s.check(name + ": regions are on the globe", valid)
 
 
+def check_normals(t):
+    """On the last level: by differences of the raster, turned into space here."""
+    worst, seen = 0.0, 0
+    for p, tile in t.tiles.items():
+        if p[0] < t.set.levels - 1:
+            continue
+        for v, (col, row) in enumerate(t.samples_of(tile, t.cell(*p))):
+            if not (0 < col < t.width - 1 and 0 < row < t.height - 1):
+                continue
+            east, west, north, south = (t.place(col + a, row + b) for a, b in ((1, 0), (-1, 0), (0, -1), (0, 1)))
+            x, y = minus(east, west), minus(north, south)
+            n = (x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0])
+            cosine = dot(n, tile.normals[v]) / math.sqrt(dot(n, n) * dot(tile.normals[v], tile.normals[v]))
+            worst, seen = max(worst, math.degrees(math.acos(min(1, cosine)))), seen + 1
+    s.check("%s: normals are the terrain's, from its full resolution (%d, worst %.2f degrees)" % (t.name, seen, worst), seen > 1000 and worst < 0.7, worst)
+
+
 def check_seams(t):
     """What two tiles of a level share: the same places, bit by bit, and the same normals."""
     compared, different = 0, []
@@ -387,6 +408,8 @@ def check_seams(t):
             border = [{(tile.xyz[v], tile.normals[v]) for v, place in enumerate(places) if place[axis] == at}
                       for tile, places in ((tile, own), (t.tiles[other], theirs))]
             compared += len(border[0])
+            normals = [dict(side) for side in border]
+            different += [(level, x, y, other, p) for p in set(normals[0]) & set(normals[1]) if normals[0][p] != normals[1][p]]
             if border[0] != border[1] and t.is_whole:
                 different.append((level, x, y, other))
             if not t.is_whole and {a for a, _ in border[0]} != {a for a, _ in border[1]}:
@@ -418,6 +441,7 @@ def terrain(name, path, is_whole=True, raster=None, **imports):
 
 
 ALPS = terrain("alps", window("alps", "glarus_1arc_native_161.tif", 30, 40, 85, 73), block=3)
+check_normals(ALPS)
 AFRICA = terrain("africa", window("africa", "eastafrica.tif", 40, 60, 90, 110), block=4)
 zipped = s.temp("n42")
 s.run(["unzip", "-q", "-o", os.path.join(s.DATA, "N42E001.hgt.zip"), "-d", zipped])
