@@ -135,6 +135,10 @@ $(BUILD)/tests/test_%.o: tests/test_%.c $(GENERATED)
 	@echo "  compile $<"; $(CC) $(CFLAGS) $(INCLUDES) -Itests -DSQLITE_CORE $(GDAL_CFLAGS) -c $< -o $@
 $(BUILD)/tests/test_%: $(BUILD)/tests/test_%.o $(BUILD)/tests/libtest.a
 	@$(CXX) $(SANITIZE) $(LINK_TEST) -o $@ $^ $(LIBS_TEST)
+# The judge of tiles is linked to nothing of ours.
+$(BUILD)/tests/verify_tiles: tests/verify_tiles.cpp $(wildcard tests/verify_tiles_*.h)
+	@mkdir -p $(@D)
+	@echo "  compile $<"; $(CXX) $(filter-out -MMD -MP,$(CXXFLAGS)) $(GDAL_CFLAGS) -o $@ $< $(shell gdal-config --libs 2>/dev/null) -lcjson
 # The C decoder's answers, beside which the page's are put.
 $(BUILD)/tests/web/decode: tests/web/decode.c $(BUILD)/librqt.a
 	@mkdir -p $(@D)
@@ -236,6 +240,12 @@ verify-views: ## rqt_view_verify over 200 cameras on every DEM of DATA=dir, and 
 	@./src/install-packages.sh build test
 	@$(MAKE) --no-print-directory -j2 products
 	@RQT=$(BUILD)/rqt RQT_SO=$(BUILD)/rqt.so /usr/bin/python3 tests/bench/verify_views.py $(DATA)
+
+.PHONY: verify-tiles
+verify-tiles: ## every tile of every level of every DEM of DATA=dir, decoded, beside the raster at every sample; the service too: tables
+	@./src/install-packages.sh build test
+	@$(MAKE) --no-print-directory -j2 products $(BUILD)/tests/verify_tiles
+	@BUILD=$(BUILD) RQT=$(BUILD)/rqt RQT_SO=$(BUILD)/rqt.so /usr/bin/python3 tests/verify_tiles.py $(DATA)
 
 .PHONY: check-layers
 check-layers: ## modules depend one way only; librqt.a and rqt.so mention only what they may

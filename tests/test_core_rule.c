@@ -26,6 +26,20 @@ static void rules_equal_their_definition_on_larger_rasters(void **state) {
     }
 }
 
+/* Nothing but ranks: blocks are chosen from in one pass, not from their centres down. */
+static void eps_lowered_by_rank_alone_is_its_definition(void **state) {
+    (void)state;
+    random_begin("lowered");
+    for (int n = 0; n < 60; n++) {
+        trial *t = trial_create(random_between(1, 36), random_between(1, 36), 0);
+        const double step = t->eps * random_unit() / 4;
+        t->places = t->forced_count = 0;
+        for (int rank = 0; rank < RQT_RANKS; rank++) t->lowering[rank] = rank * step;
+        check_trial(t);
+        trial_free(t);
+    }
+}
+
 /* Flat terrain and a coarse eps: what is selected is what the border forces. Cheap, so that rare cases come up:
  * clamped triangles that stick out of R' though their children do not, half cells that a line touches and no
  * polygon meets. */
@@ -412,6 +426,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         TEST(rules_equal_their_definition_on_small_rasters),
         TEST(rules_equal_their_definition_on_larger_rasters),
+        TEST(eps_lowered_by_rank_alone_is_its_definition),
         TEST(borders_force_what_is_mixed_and_no_more),
         TEST(F19_four_eps_at_a_block_corner_meet_without_t_junctions),
         TEST(F20_closure_is_transitive_across_blocks),

@@ -501,6 +501,16 @@ HOLES = pyramid("holes", s.write_grid(s.temp("holes.asc"), hole, 12.3, 45.6, 1 /
 check_pyramid(HOLES, False)
 listed_exactly(HOLES, False)
 
+# As high as more tiles than are asked together, in small blocks: some squares of tiles are whole, some empty.
+tall = s.rough_grid(70, 1150, 5, relief=40)
+for row in range(1150):
+    for col in range(70):
+        if row % 200 > 90 + col or (col - 30) ** 2 + (row - 480) ** 2 < 60:
+            tall[row][col] = None
+TALL = pyramid("tall", s.write_grid(s.temp("tall.asc"), tall, 30.01, 44.02, 1 / 1200, s.WGS84), tall, block=3)
+s.equal("tall: layer.json lists the same tiles", sorted(listed(TALL.layer)), sorted(TALL.tiles))
+listed_exactly(TALL, False)
+
 # Longitudes beyond 180: the same places by another name.
 hill = s.rough_grid(90, 70, 11, relief=500)
 NEAR = pyramid("near", s.write_grid(s.temp("near.asc"), hill, -1.5, 50.25, 1 / 64, s.WGS84), hill)

@@ -94,7 +94,8 @@ static bool take_corner(cutting *c, uint32_t corner, uint32_t *number) {
 static kept_place *find_place(kept_place *places, size_t size, region_point p) {
     uint64_t h = ((uint64_t)p.x * UINT64_C(0x9E3779B97F4A7C15)) ^ (uint64_t)p.y;
     h *= UINT64_C(0xBF58476D1CE4E5B9);
-    for (size_t slot = (size_t)(h >> 20) & (size - 1);; slot = (slot + 1) & (size - 1)) {
+    h >>= __builtin_clzll(size) + 1; /* the topmost bits: those below know nothing of whole samples */
+    for (size_t slot = (size_t)h;; slot = (slot + 1) & (size - 1)) {
         kept_place *k = &places[slot];
         if (k->vertex == NO_VERTEX || (k->place.x == p.x && k->place.y == p.y)) return k;
     }
@@ -419,10 +420,10 @@ static bool cut_leaf(cutting *c, const leaf *l) {
     for (size_t i = 0; i < c->faces.face_count; i++) {
         const cut_face *face = &c->faces.faces[i];
         if (!c->held[i]) continue;
-        uint32_t number[3];
-        for (int k = 0; k < 3; k++)
-            if (!take_point(c, l, face->corner[k], &number[k])) return false;
-        if (!add_triangle(c, number[0], number[2], number[1])) return false;
+        uint32_t p, q, r; /* in the order of their use: so vertices are numbered */
+        if (!take_point(c, l, face->corner[0], &p) || !take_point(c, l, face->corner[2], &q) ||
+            !take_point(c, l, face->corner[1], &r) || !add_triangle(c, p, q, r))
+            return false;
     }
     return true;
 }

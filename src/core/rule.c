@@ -270,6 +270,10 @@ const rqt_field *rule_field(const rqt_rule *rule) {
     return rule->field;
 }
 
+const int32_t *rule_thresholds(const rqt_rule *rule) {
+    return rule->base;
+}
+
 /* A place or square that holds the whole cell meets every box in it. */
 rule_range rule_range_below(const rqt_rule *rule, rqt_vertex centre) {
     const int rank = rqt_vertex_rank(&rule->lattice, centre);

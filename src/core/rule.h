@@ -11,6 +11,8 @@ typedef struct rule_range {
     bool forced, places;
 } rule_range;
 rule_range rule_range_below(const rqt_rule *rule, rqt_vertex centre);
+/* The threshold by rank, RQT_RANKS of them, where there is neither a place nor a square nor a forced vertex. */
+const int32_t *rule_thresholds(const rqt_rule *rule);
 const rqt_lattice *rule_lattice(const rqt_rule *rule);
 const rqt_field *rule_field(const rqt_rule *rule); /* NULL: none */
 /* The threshold of a vertex of this rank by the rule's own eps and a field's code. */

@@ -52,6 +52,34 @@ static uint8_t choose_by_error(const rqt_block *b, size_t count, rqt_code eps, u
     return all;
 }
 
+/* The same for one row of a block, with a threshold for each vertex. */
+VECTOR_CLONES
+static uint8_t choose_row(const rqt_code *restrict error, const uint8_t *restrict flags,
+                          const int32_t *restrict threshold, size_t count, uint8_t mask, uint8_t *restrict out) {
+    uint8_t all = 0xFF;
+    for (size_t i = 0; i < count; i++) {
+        out[i] = (uint8_t)((error[i] > threshold[i]) | ((flags[i] & mask) != 0));
+        all &= (uint8_t)(flags[i] | (out[i] - 1));
+    }
+    return all;
+}
+
+/* By thresholds of ranks: what is selected is closed (rule.c), so nobody need go down to it. Rows whose numbers
+ * have the same power of two in them have the same ranks; the first and the last one have those of the block's
+ * sides. */
+static uint8_t choose_by_rank(const walk *w, const int32_t by_rank[RQT_RANKS], uint8_t mask) {
+    int32_t threshold[RQT_MAX_BLOCK_K + 1][(1 << RQT_MAX_BLOCK_K) + 1];
+    const uint32_t n = (uint32_t)w->n;
+    for (uint32_t power = 0; 1U << power < n; power++)
+        for (uint32_t u = 0; u < n; u++)
+            threshold[power][u] = by_rank[rqt_vertex_rank(&w->query->lattice, place_vertex(w, (n << power) + u))];
+    uint8_t all = 0xFF;
+    for (uint32_t v = 0; v < n; v++)
+        all &= choose_row(w->block->error + n * v, w->block->flags + n * v, threshold[__builtin_ctz(v | (n - 1))],
+                          n, mask, w->chosen + n * v);
+    return all;
+}
+
 /* Where places or forced vertices are near: down from the block's centre, as far as they are selected. */
 typedef struct choosing {
     const walk *w;
@@ -86,8 +114,9 @@ static uint8_t choose_by_rule(const walk *w, uint8_t mask) {
     choosing c = {w, rule_range_below(w->query->rule, centre), mask, 0xFF};
     if (c.range.least == c.range.most && c.range.least >= 0 && !c.range.forced)
         return choose_by_error(w->block, (size_t)n * n, (rqt_code)c.range.least, mask, w->chosen);
-    if (rule_field(w->query->rule) && !c.range.places && !c.range.forced)
-        return rule_choose(w->query->rule, &w->place, w->block, mask, w->chosen);
+    const bool is_plain = !c.range.places && !c.range.forced;
+    if (is_plain && !rule_field(w->query->rule)) return choose_by_rank(w, rule_thresholds(w->query->rule), mask);
+    if (is_plain) return rule_choose(w->query->rule, &w->place, w->block, mask, w->chosen);
     memset(w->chosen, 0, (size_t)n * n);
     /* The diagonal from one corner to the one across; query.c has the same cases. */
     const int from = w->place.level == 0 ? 0 : (w->place.i & 1) | (w->place.j & 1) << 1;

@@ -113,10 +113,24 @@ static void ground(const store_terrain *t, int32_t row, double *column_east, dou
     *row_north = p->dy * degree * a * (1 - e2) / (w * sqrt(w));
 }
 
-static void normal_of(const store_terrain *t, const rqt_patch_vertex *v, const cross *c, float normal[3]) {
+/* Vertices have few rows: what is known of one is kept for the next vertex that has it. */
+enum { KEPT_ROWS = 256 };
+typedef struct kept_row {
+    int32_t row;
     double east, north;
-    ground(t, v->row, &east, &north);
-    const double quantum = rqt_unit_factor(&t->unit) / (double)t->unit.d;
+} kept_row;
+
+static const kept_row *find_row(const store_terrain *t, kept_row kept[KEPT_ROWS], int32_t row) {
+    kept_row *k = &kept[row % KEPT_ROWS];
+    if (k->row != row) {
+        k->row = row;
+        ground(t, row, &k->east, &k->north);
+    }
+    return k;
+}
+
+static void normal_of(const kept_row *at, double quantum, const cross *c, float normal[3]) {
+    const double east = at->east, north = at->north;
     const double x = east != 0 ? -slope(c, WEST, EAST) * quantum / east : 0;
     const double y = -slope(c, NORTH, SOUTH) * quantum / north;
     const double length = sqrt(x * x + y * y + 1);
@@ -154,8 +168,11 @@ int store_normals(store *s, const store_terrain *t, const rqt_patch *patch, floa
         memset(crosses, 0, (count + 1) * sizeof *crosses);
         list_requests(t, patch, &list);
         code = answer_requests(s, t, patch, &list, crosses, error);
+        const double quantum = rqt_unit_factor(&t->unit) / (double)t->unit.d;
+        kept_row rows[KEPT_ROWS];
+        for (int i = 0; i < KEPT_ROWS; i++) rows[i].row = -1;
         for (size_t v = 0; v < count && code == SQLITE_OK; v++)
-            normal_of(t, &patch->vertices[v], &crosses[v], *normals + 3 * v);
+            normal_of(find_row(t, rows, patch->vertices[v].row), quantum, &crosses[v], *normals + 3 * v);
         store_end(s);
     }
     sqlite3_free(list.row);

@@ -301,3 +301,46 @@ int store_query_tables(store *s, const store_terrain *t, store_question *questio
     sqlite3_free(sentence);
     return code;
 }
+
+/* ------------------------------------------------------------------------------------- covered, and by how much */
+
+/* Leaves over the cell of a block that answers have selected vertices of the block or its corners for their own,
+ * and perhaps one of the two vertices outside of it that its summary has (core/query.c). When all of those are
+ * valid, all leaves are kept, and the mesh has no gap over the cell as far as there are samples; when all of the
+ * block are void no leaf is kept, for each has two corners of it at least. */
+static int cover_of(store *s, const store_terrain *t, const rqt_answer *answer, store_cover *cover, char **error) {
+    const uint8_t *bytes;
+    int size;
+    rqt_block_header header;
+    int code = store_block_bytes(s, t, answer->number, &bytes, &size, error);
+    if (code == SQLITE_OK && rqt_block_info(bytes, (size_t)size, &header, NULL) != RQT_OK)
+        code = store_fail(error, SQLITE_CORRUPT_VTAB, "terrain %s is damaged: block %llu", t->name, answer->number);
+    sqlite3_reset(store_statements(s, t)->bytes);
+    uint8_t all = RQT_VALID;
+    for (int i = 0; i < 2 && answer->number > 1; i++) all &= answer->summary.far[i].flags;
+    *cover = STORE_COVER_UNKNOWN;
+    if (code == SQLITE_OK && header.all_void) *cover = STORE_COVER_NOTHING;
+    if (code == SQLITE_OK && !header.has_voids && !header.all_void && all) *cover = STORE_COVER_ALL;
+    return code;
+}
+
+int store_covers(store *s, const store_terrain *t, const int32_t box[4], double eps,
+                 const store_query_options *options, store_cover *cover, char **error) {
+    answer_list list = {0};
+    *cover = STORE_COVER_UNKNOWN;
+    int code = store_begin_on(s, t, error);
+    if (code != SQLITE_OK) return code;
+    code = find_answers(s, t, box, options->outline, rqt_code_eps(eps, t->quantum_error), &list, error);
+    if (code == SQLITE_OK && options->rule && rqt_rule_set_eps(options->rule, eps) == RQT_OK)
+        code = refine_answers(s, t, box, options->outline, options->rule, &list, error);
+    for (size_t i = 0; i < list.count && code == SQLITE_OK; i++) {
+        store_cover one;
+        code = cover_of(s, t, &list.rows[i], &one, error);
+        if (i == 0) *cover = one;
+        if (one != *cover) *cover = STORE_COVER_UNKNOWN;
+        if (*cover == STORE_COVER_UNKNOWN) break;
+    }
+    sqlite3_free(list.rows);
+    store_end(s);
+    return code;
+}

@@ -7,7 +7,8 @@
  *     sides       west, south, east, north: count, indices
  *     extensions  id (1 byte), length (4): 1 oct-encoded normals, 2 water mask (terrains with a sea), 4 metadata
  *
- * A vertex has the number of its first use: so each new one is the next, which is what the high-water mark wants.
+ * The cut has its vertices in the order of the triangles: each new one is the next, which is what the high-water
+ * mark wants.
  */
 #include "internal.h"
 

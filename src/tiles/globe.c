@@ -50,7 +50,8 @@ static void place_all(const tile_mesh *mesh, tile_globe *globe) {
     for (int i = 0; i < KEPT_ANGLES; i++) lons[i] = lats[i] = (kept_angle){.cosine = 1};
     for (size_t i = 0; i < mesh->cut.vertex_count; i++) {
         const double *p = mesh->lonlath + 3 * i;
-        const kept_angle *lon = find_angle(lons, mesh->u[i], p[0]), *lat = find_angle(lats, mesh->v[i], p[1]);
+        const kept_angle *lon = find_angle(lons, mesh->u[i], p[0] < 180 ? p[0] : p[0] - 360),
+                         *lat = find_angle(lats, mesh->v[i], p[1]);
         const double n = A / sqrt(1 - e2 * lat->sine * lat->sine);
         globe->angles[i] = (tile_angles){lon->sine, lon->cosine, lat->sine, lat->cosine};
         globe->xyz[3 * i] = (n + p[2]) * lat->cosine * lon->cosine;
@@ -121,21 +122,24 @@ typedef struct around {
     float weight[4];
 } around;
 
-static around list_samples(const rqt_cut_vertex *v, rqt_patch *samples) {
+static around list_samples(const tiles *t, const rqt_cut_vertex *v, rqt_patch *samples) {
     around a = {0};
+    const int32_t last = t->terrain->lattice.width - 1;
     const double col = floor(v->col), row = floor(v->row), right = v->col - col, down = v->row - row;
+    /* On a seam: the mean of both columns. */
+    const bool is_seam = plan_of(t)->seam && (v->col <= 0 || v->col >= last);
     for (int i = 0; i < 4; i++) {
-        const double weight = (i & 1 ? right : 1 - right) * (i & 2 ? down : 1 - down);
+        const double weight = (is_seam ? 0.5 : i & 1 ? right : 1 - right) * (i & 2 ? down : 1 - down);
         if (weight <= 0) continue;
-        samples->vertices[samples->vertex_count++] =
-            (rqt_patch_vertex){.col = (int32_t)col + (i & 1), .row = (int32_t)row + (i >> 1)};
+        samples->vertices[samples->vertex_count++] = (rqt_patch_vertex){
+            .col = is_seam ? (i & 1 ? last : 0) : (int32_t)col + (i & 1), .row = (int32_t)row + (i >> 1)};
         a.weight[a.count++] = (float)weight;
     }
     return a;
 }
 
 static uint8_t to_byte(double x) {
-    return (uint8_t)floor((x < -1 ? 0 : x > 1 ? 1 : x * 0.5 + 0.5) * 255 + 0.5);
+    return (uint8_t)((x < -1 ? 0 : x > 1 ? 1 : x * 0.5 + 0.5) * 255 + 0.5);
 }
 
 /* "A Survey of Efficient Representations for Independent Unit Vectors" (Cigolle and others, 2014): oct, 16 bits. */
@@ -166,7 +170,7 @@ int globe_normals(tiles *t, const tile_mesh *mesh, const tile_globe *globe, uint
     float *normals = NULL;
     int code = samples.vertices && all ? SQLITE_OK : SQLITE_NOMEM;
     if (code == SQLITE_OK) {
-        for (size_t i = 0; i < count; i++) all[i] = list_samples(&mesh->cut.vertices[i], &samples);
+        for (size_t i = 0; i < count; i++) all[i] = list_samples(t, &mesh->cut.vertices[i], &samples);
         code = store_normals(t->store, t->terrain, &samples, &normals, error);
     }
     const float *next = normals;

@@ -5,6 +5,7 @@
  *
  * quantized-mesh (quantized_mesh.c):
  *   plan.c     levels and their tolerances, heights, where tiles lie on the raster
+ *   seam.c     terrains that go around the Earth
  *   mesh.c     the terrain's mesh, cut to a tile and quantised; what it is off
  *   globe.c    places in space: bounding sphere, horizon, normals
  *   water.c    the water mask
@@ -67,6 +68,7 @@ enum { TILE_UNITS = 32767 }; /* a tile's side, and the range of heights, in what
 typedef struct tile_level {
     double geometric_error; /* what clients take the level to be off, metres */
     double eps;             /* of the mesh, in space, before it is quantised */
+    rqt_rule *rule;         /* NULL: the plan's */
 } tile_level;
 
 typedef struct sea_run {
@@ -80,8 +82,11 @@ typedef struct tile_plan {
     double lowest, step; /* a height n is lowest + n * step metres, 0 <= n <= TILE_UNITS; step a power of two */
     double radius;       /* no radius of curvature, and height above it, is larger: metres */
     double rounded;      /* the terrain's quantum_error */
-    rqt_rule *rule;      /* its lowering is what curvature takes */
-    geo_frame *geoid;    /* NULL: heights are the ellipsoid's */
+    double lowering[RQT_RANKS]; /* what curvature takes of eps */
+    rqt_rule *rule;             /* with it */
+    int32_t *seam;              /* heights of the first column, if the last one is the same; else NULL */
+    double merging;             /* the last column's differ by no more: metres */
+    geo_frame *geoid;           /* NULL: heights are the ellipsoid's */
     geo_geoid undulation;
     bool has_sea;
     sea_run *sea;
@@ -117,8 +122,21 @@ bool plan_place(const tiles *t, int z, int32_t x, int32_t y, tile_place *place);
 int plan_ranges(const tiles *t, int z, tile_range ranges[MOST_TURNS]);
 /* The place's rectangle as a region. */
 int plan_region(const tiles *t, const tile_place *place, rqt_region **region);
-/* The options of every query. */
-store_query_options plan_options(const tiles *t);
+/* The options of every query of a level. */
+store_query_options plan_options(const tiles *t, int z);
+/* A rule like the plan's. */
+int plan_rule(const tiles *t, rqt_rule **rule, char **error);
+/* Has the mesh of eps a triangle in a region? Looks no further than the first. */
+int plan_has_triangle(tiles *t, const rqt_region *region, double eps, const store_query_options *options,
+                      bool *is_there, char **error);
+
+/* Are the terrain's first and last columns one? Fills the plan's seam and merging. */
+int seam_read(tiles *t, char **error);
+/* If so: gives levels rules of their own. */
+int seam_close(tiles *t, char **error);
+/* ... gives vertices of the last column the heights of the first; by how much samples of either may be off by that:
+ * metres. */
+double seam_merge(const tiles *t, rqt_patch *patch);
 
 typedef struct tile_mesh {
     rqt_cut cut;         /* vertices in samples */
@@ -127,6 +145,7 @@ typedef struct tile_mesh {
     uint32_t *edge[4];   /* vertices on the tile's west, south, east, north side, from south or west on */
     uint32_t edge_count[4];
     double move[3];        /* the most that a vertex was moved: degrees, degrees, metres */
+    double merged;         /* the last of them, as far as the seam has done it */
     double error;          /* no sample is further from the mesh in space: metres */
     double vertical_error; /* ... above or below it in longitude, latitude, height, where the outline is not near */
 } tile_mesh;

@@ -1,8 +1,10 @@
 /* layer.c - which tiles there are, and what clients are told of them: layer.json.
  *
  * A tile is there iff a triangle of the level's mesh has inner points in it. Where no sample is void the mesh is
- * the raster's rectangle, so the tiles that overlap it are those. Elsewhere each of them is asked, by a query that
- * stops at the first block with a triangle.
+ * the raster's rectangle, so the tiles that overlap it are those. Elsewhere squares of tiles are asked: where all
+ * blocks that answer have no void, or nothing else, that holds for all of their tiles (store_covers). Other squares
+ * are quartered, and a tile that is left is asked by a query that stops at the first block with a triangle. So it
+ * takes as many queries as there are tiles near the outlines of voids.
  */
 #include "internal.h"
 
@@ -35,45 +37,94 @@ static int add_range(range_list *list, tile_range range) {
 
 /* Has the tile a triangle? */
 static int probe(tiles *t, int z, int32_t x, int32_t y, bool *is_there, char **error) {
-    store_limits *limits = store_limits_of(t->store);
-    const int64_t before = limits->triangles;
-    const store_query_options options = plan_options(t);
+    const store_query_options options = plan_options(t, z);
     rqt_region *region = NULL;
-    rqt_patch patch = {0};
     tile_place place;
     *is_there = false;
     if (!plan_place(t, z, x, y, &place) || place.turns == 0) return SQLITE_OK;
     int code = plan_region(t, &place, &region);
-    if (code == SQLITE_OK) {
-        limits->triangles = 1; /* more is not looked for */
-        code = store_query(t->store, t->terrain, region, plan_of(t)->level[z].eps, &options, &patch, NULL, error);
-        limits->triangles = before;
-        *is_there = code == SQLITE_TOOBIG || patch.triangle_count > 0;
-    }
-    if (code == SQLITE_TOOBIG) {
-        sqlite3_free(*error);
-        *error = NULL;
-        code = SQLITE_OK;
-    }
-    store_keep(t->store, &patch);
+    if (code == SQLITE_OK) code = plan_has_triangle(t, region, plan_of(t)->level[z].eps, &options, is_there, error);
     rqt_region_free(region);
     return code;
 }
 
-/* The tiles of a row from x0 to x1 that are there. */
-static int add_row(tiles *t, int z, int32_t y, int32_t x0, int32_t x1, range_list *list, char **error) {
-    int32_t first = -1;
-    for (int32_t x = x0; x <= x1 + 1; x++) {
-        bool is_there = x <= x1;
-        int code = is_there ? probe(t, z, x, y, &is_there, error) : SQLITE_OK;
-        if (code == SQLITE_OK && !is_there && first >= 0) {
-            code = add_range(list, (tile_range){first, x - 1, y, y});
-            first = -1;
-        }
-        if (code != SQLITE_OK) return code;
-        if (is_there && first < 0) first = x;
+/* How much of the tiles has triangles: all, nothing, or who knows. */
+static int find_cover(tiles *t, int z, const tile_range *r, store_cover *cover, char **error) {
+    const rqt_lattice *lattice = &t->terrain->lattice;
+    const store_query_options options = plan_options(t);
+    tile_place first, last; /* south-west, north-east */
+    *cover = STORE_COVER_UNKNOWN;
+    if (!plan_place(t, z, r->x0, r->y0, &first) || !plan_place(t, z, r->x1, r->y1, &last)) return SQLITE_OK;
+    const tile_turn *a = &first.turn[0], *b = &last.turn[0];
+    if (first.turns != 1 || last.turns != 1 || a->box[0] > b->box[0]) return SQLITE_OK; /* not of one turn */
+    const int32_t box[4] = {(int32_t)fmax(0, floor(a->cut[0])), (int32_t)fmin(lattice->width - 1, ceil(b->cut[1])),
+                            (int32_t)fmax(0, floor(b->cut[2])),
+                            (int32_t)fmin(lattice->height - 1, ceil(a->cut[3]))};
+    return store_covers(t->store, t->terrain, box, plan_of(t)->level[z].eps, &options, cover, error);
+}
+
+/* Rows of tiles, as many as a square is high, from x0, y0 on. */
+enum { SQUARE = 16 };
+typedef struct band {
+    int32_t x0, y0;
+    size_t width;
+    bool *is_there;
+} band;
+
+static int ask_square(tiles *t, int z, const tile_range *r, band *b, char **error) {
+    store_cover cover;
+    bool is_there;
+    int code = find_cover(t, z, r, &cover, error);
+    if (code != SQLITE_OK) return code;
+    if (cover == STORE_COVER_UNKNOWN && (r->x0 < r->x1 || r->y0 < r->y1)) {
+        const int32_t x = r->x0 + (r->x1 - r->x0) / 2, y = r->y0 + (r->y1 - r->y0) / 2;
+        const tile_range quarter[4] = {
+            {r->x0, x, r->y0, y}, {x + 1, r->x1, r->y0, y}, {r->x0, x, y + 1, r->y1}, {x + 1, r->x1, y + 1, r->y1}};
+        for (int i = 0; i < 4 && code == SQLITE_OK; i++)
+            if (quarter[i].x0 <= quarter[i].x1 && quarter[i].y0 <= quarter[i].y1)
+                code = ask_square(t, z, &quarter[i], b, error);
+        return code;
     }
-    return SQLITE_OK;
+    is_there = cover == STORE_COVER_ALL;
+    if (cover == STORE_COVER_UNKNOWN) code = probe(t, z, r->x0, r->y0, &is_there, error);
+    for (int32_t y = r->y0; y <= r->y1; y++)
+        for (int32_t x = r->x0; x <= r->x1; x++)
+            b->is_there[(size_t)(y - b->y0) * b->width + (size_t)(x - b->x0)] = is_there;
+    return code;
+}
+
+static int add_row(const band *b, int32_t y, range_list *list) {
+    const bool *row = b->is_there + (size_t)(y - b->y0) * b->width;
+    int code = SQLITE_OK;
+    for (size_t i = 0, end; i < b->width && code == SQLITE_OK; i = end) {
+        for (end = i + 1; end < b->width && row[end] == row[i];) end++;
+        if (row[i]) code = add_range(list, (tile_range){b->x0 + (int32_t)i, b->x0 + (int32_t)end - 1, y, y});
+    }
+    return code;
+}
+
+/* The tiles of rows that are there, of the ranges that overlap the raster. */
+static int add_band(tiles *t, int z, const tile_range *all, int n, int32_t y0, int32_t y1, range_list *list,
+                    char **error) {
+    band bands[MOST_TURNS] = {{0}};
+    int code = SQLITE_OK;
+    for (int i = 0; i < n && code == SQLITE_OK; i++) {
+        const tile_range *r = &all[i];
+        bands[i] = (band){r->x0, y0, (size_t)(r->x1 - r->x0) + 1, NULL};
+        bands[i].is_there = sqlite3_malloc64(bands[i].width * SQUARE);
+        if (!bands[i].is_there) code = SQLITE_NOMEM;
+        for (int32_t x = r->x0; x <= r->x1 && code == SQLITE_OK; x += SQUARE) {
+            const tile_range square = {x, r->x1 - x < SQUARE ? r->x1 : x + SQUARE - 1, y0, y1};
+            code = ask_square(t, z, &square, &bands[i], error);
+        }
+    }
+    for (int32_t y = y0; y <= y1 && code == SQLITE_OK; y++) {
+        const size_t before = list->count;
+        for (int i = 0; i < n && code == SQLITE_OK; i++) code = add_row(&bands[i], y, list);
+        while (list->row < before && list->items[list->row].y1 < y) list->row++;
+    }
+    for (int i = 0; i < n; i++) sqlite3_free(bands[i].is_there);
+    return code;
 }
 
 int layer_available(tiles *t, int z, const tile_range **ranges, size_t *count, char **error) {
@@ -90,12 +141,9 @@ int layer_available(tiles *t, int z, const tile_range **ranges, size_t *count, c
         list.capacity = list.items ? MOST_TURNS : 0;
         if (!list.items) return SQLITE_NOMEM;
         for (int i = 0; i < n && t->terrain->voids == 0 && code == SQLITE_OK; i++) code = add_range(&list, all[i]);
-        for (int32_t y = n ? all[0].y0 : 0; n && y <= all[0].y1 && t->terrain->voids && code == SQLITE_OK; y++) {
-            const size_t row = list.count;
-            for (int i = 0; i < n && code == SQLITE_OK; i++)
-                code = add_row(t, z, y, all[i].x0, all[i].x1, &list, error);
-            while (list.row < row && list.items[list.row].y1 < y) list.row++;
-        }
+        const int32_t y1 = n ? all[0].y1 : -1; /* all ranges have the same rows */
+        for (int32_t y = n ? all[0].y0 : 0; y <= y1 && t->terrain->voids && code == SQLITE_OK; y += SQUARE)
+            code = add_band(t, z, all, n, y, y1 - y < SQUARE ? y1 : y + SQUARE - 1, &list, error);
         if (code != SQLITE_OK) {
             sqlite3_free(list.items);
             return code;

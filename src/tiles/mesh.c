@@ -189,7 +189,7 @@ static int list_side(tile_mesh *mesh, int side) {
 /* -------------------------------------------------------------------------------------------------- whole -- */
 
 static int cut_patch(tiles *t, const tile_place *place, rqt_patch *patch, tile_mesh *mesh, char **error) {
-    const store_query_options options = plan_options(t);
+    const store_query_options options = plan_options(t, place->z);
     rqt_region *region = NULL;
     waiting w = {t->store, SQLITE_INTERRUPT};
     int code = plan_region(t, place, &region);
@@ -197,6 +197,7 @@ static int cut_patch(tiles *t, const tile_place *place, rqt_patch *patch, tile_m
         code = store_query(t->store, t->terrain, region, plan_of(t)->level[place->z].eps, &options, patch, NULL,
                            error);
     if (code == SQLITE_OK) {
+        mesh->merged = seam_merge(t, patch);
         const rqt_status status =
             rqt_cut_make(patch, region, &t->terrain->lattice, store_allocator(), is_interrupted, &w, &mesh->cut);
         code = status == RQT_OK ? SQLITE_OK : status == RQT_INTERRUPTED ? w.code : SQLITE_NOMEM;
@@ -205,35 +206,10 @@ static int cut_patch(tiles *t, const tile_place *place, rqt_patch *patch, tile_m
     return code;
 }
 
-/* The cut numbers a vertex when it meets it, which within a leaf is not the order of the triangles' corners; here
- * each gets the number of its first use (encode.c). */
-static int number_by_use(rqt_cut *cut) {
-    const size_t n = cut->vertex_count;
-    uint32_t *now = sqlite3_malloc64((n + 1) * sizeof *now), next = 0;
-    rqt_cut_vertex *before = sqlite3_malloc64((n + 1) * sizeof *before);
-    if (now && before) {
-        memset(now, 0xFF, n * sizeof *now);
-        if (n > 0) memcpy(before, cut->vertices, n * sizeof *before);
-        for (size_t i = 0; i < 3 * cut->triangle_count; i++) {
-            const uint32_t vertex = cut->triangles[i];
-            if (now[vertex] == UINT32_MAX) {
-                cut->vertices[next] = before[vertex];
-                now[vertex] = next++;
-            }
-            cut->triangles[i] = now[vertex];
-        }
-    }
-    const bool ok = now && before;
-    sqlite3_free(now);
-    sqlite3_free(before);
-    return ok ? SQLITE_OK : SQLITE_NOMEM;
-}
-
 int mesh_make(tiles *t, const tile_place *place, tile_mesh *mesh, char **error) {
     rqt_patch patch = {0};
     *mesh = (tile_mesh){0};
     int code = cut_patch(t, place, &patch, mesh, error);
-    if (code == SQLITE_OK) code = number_by_use(&mesh->cut);
     const size_t n = mesh->cut.vertex_count;
     if (code == SQLITE_OK) {
         mesh->u = sqlite3_malloc64((3 * n + 1) * sizeof *mesh->u);
@@ -246,6 +222,7 @@ int mesh_make(tiles *t, const tile_place *place, tile_mesh *mesh, char **error) 
         for (size_t i = 0; i < n && code == SQLITE_OK; i++) code = place_vertex(t, place, mesh, i, error);
     }
     for (int side = 0; side < SIDES && code == SQLITE_OK; side++) code = list_side(mesh, side);
+    mesh->move[2] += mesh->merged;
     if (code == SQLITE_OK) state_errors(t, place, &patch, mesh);
     store_keep(t->store, &patch);
     return code;

@@ -9,7 +9,8 @@
  * as long as that is no more than a pixel or two. So eps(z) = G(z) - move(z), where move(z) is the most that
  * quantisation moves a vertex (mesh.c): then what is promised is true at every level, whatever the terrain. The
  * last level, the first whose tiles are no more than 64 samples a side, is as fine as clients get to see: its eps
- * is half a quantum of the terrain's heights where that is less, and the mesh is the terrain.
+ * is half a quantum of the terrain's heights where that is less, and the mesh is the terrain. Voids may ask for
+ * less at the first levels (keep_ground).
  *
  * One eps at a level, one rule, one mesh: tiles are parts of it. The rule is lowered by what the Earth's curvature
  * takes from flat triangles (geo_frame_sag), as option frame does, for clients draw chords in space.
@@ -40,28 +41,32 @@ enum { LARGEST_TILE = 64, FIRST_STEP = -10, UNIT_BITS = 20 };
 
 /* ------------------------------------------------------------------------------------------------- levels -- */
 
+int plan_rule(const tiles *t, rqt_rule **rule, char **error) {
+    rqt_status status = rqt_rule_create(&t->terrain->lattice, t->terrain->quantum_error, store_allocator(), rule);
+    if (status == RQT_OK) status = rqt_rule_set_lowering(*rule, plan_of(t)->lowering);
+    return status == RQT_OK          ? SQLITE_OK
+           : status == RQT_NO_MEMORY ? SQLITE_NOMEM
+                                     : tiles_fail(error, "terrain %s is too large for tiles", t->terrain->name);
+}
+
 /* The rule, lowered; what is known of the geoid. */
-static int make_rule(const store_terrain *t, tile_plan *plan, bool is_above_geoid, char **error) {
+static int make_rule(tiles *t, bool is_above_geoid, char **error) {
+    tile_plan *plan = plan_of(t);
     char why[256] = "";
     const geo_ellipsoid wgs84 = GEO_WGS84;
-    const geo_extent extent = tiles_extent(t);
-    double lowering[RQT_RANKS];
+    const geo_extent extent = tiles_extent(t->terrain);
     geo_frame *frame = NULL;
     const int made = geo_frame_create(GEO_ECEF, &wgs84, 0, 0, is_above_geoid, &frame, why, sizeof why);
     if (made != GEO_OK)
         return made == GEO_NO_MEMORY ? SQLITE_NOMEM
-                                     : tiles_fail(error, "terrain %s has no tiles: %s", t->name, why);
-    geo_frame_sag(frame, &extent, RQT_RANKS, lowering);
+                                     : tiles_fail(error, "terrain %s has no tiles: %s", t->terrain->name, why);
+    geo_frame_sag(frame, &extent, RQT_RANKS, plan->lowering);
     plan->undulation = geo_frame_geoid(frame, &extent);
     if (is_above_geoid)
         plan->geoid = frame;
     else
         geo_frame_free(frame);
-    rqt_status status = rqt_rule_create(&t->lattice, t->quantum_error, store_allocator(), &plan->rule);
-    if (status == RQT_OK) status = rqt_rule_set_lowering(plan->rule, lowering);
-    return status == RQT_OK          ? SQLITE_OK
-           : status == RQT_NO_MEMORY ? SQLITE_NOMEM
-                                     : tiles_fail(error, "terrain %s is too large for tiles", t->name);
+    return plan_rule(t, &plan->rule, error);
 }
 
 static void set_heights(const store_terrain *t, tile_plan *plan) {
@@ -82,7 +87,7 @@ static void set_levels(const store_terrain *t, tile_plan *plan) {
     for (int z = 0; z < TILES_LEVELS; z++) {
         tile_level *level = &plan->level[z];
         const double side = ldexp(180, -z), unit = side * DEGREE / TILE_UNITS * plan->radius;
-        const double move = hypot(M_SQRT2 * unit, plan->step / 2);
+        const double move = hypot(M_SQRT2 * unit, plan->step / 2 + plan->merging);
         level->geometric_error = ldexp(ROOT_ERROR, -z);
         if (z > 0 && move > level->geometric_error / 2) break; /* finer than heights are told */
         plan->finest = z;
@@ -91,6 +96,29 @@ static void set_levels(const store_terrain *t, tile_plan *plan) {
         level->eps = fmin(level->eps, quantum * LAST_EPS);
         break;
     }
+}
+
+/* Voids: an eps as large as what is left of a terrain would leave no triangle of it, and clients who find nothing
+ * at the first level look no further. So eps is halved until there is one. */
+static int keep_ground(tiles *t, char **error) {
+    tile_plan *plan = plan_of(t);
+    const double cell = fmax(t->terrain->placement.dx, -t->terrain->placement.dy) * DEGREE * EQUATOR;
+    const rqt_placement as_it_is = {0, 0, 1, 1};
+    const store_query_options options = plan_options(t, 0);
+    rqt_region *all = NULL;
+    bool is_there = false;
+    double most = plan->level[0].eps;
+    if (t->terrain->voids == 0) return SQLITE_OK;
+    if (rqt_region_create(NULL, &as_it_is, &t->terrain->lattice, store_allocator(), &all) != RQT_OK)
+        return SQLITE_NOMEM;
+    int code = plan_has_triangle(t, all, most, &options, &is_there, error);
+    while (code == SQLITE_OK && !is_there && most > cell / 2) { /* finer outlines have no more */
+        most /= 2;
+        code = plan_has_triangle(t, all, most, &options, &is_there, error);
+    }
+    for (int z = 0; z <= plan->finest && is_there; z++) plan->level[z].eps = fmin(plan->level[z].eps, most);
+    rqt_region_free(all);
+    return code;
 }
 
 int plan_create(tiles *t, void **out, char **error) {
@@ -102,12 +130,17 @@ int plan_create(tiles *t, void **out, char **error) {
     tile_plan *plan = sqlite3_malloc(sizeof *plan);
     if (!plan) return SQLITE_NOMEM;
     *plan = (tile_plan){.rounded = terrain->quantum_error};
-    code = make_rule(terrain, plan, is_above_geoid, error);
+    t->plan = plan;
+    code = make_rule(t, is_above_geoid, error);
+    if (code == SQLITE_OK) code = seam_read(t, error);
     if (code == SQLITE_OK) {
         set_heights(terrain, plan);
         set_levels(terrain, plan);
-        code = water_read(t, plan, error);
+        code = keep_ground(t, error);
     }
+    if (code == SQLITE_OK) code = seam_close(t, error);
+    if (code == SQLITE_OK) code = water_read(t, plan, error);
+    t->plan = NULL;
     if (code != SQLITE_OK)
         plan_free(plan);
     else
@@ -121,16 +154,39 @@ void plan_free(void *made) {
     rqt_rule_free(plan->rule);
     geo_frame_free(plan->geoid);
     sqlite3_free(plan->sea);
-    for (int z = 0; z < TILES_LEVELS; z++) sqlite3_free(plan->ranges[z]);
+    sqlite3_free(plan->seam);
+    for (int z = 0; z < TILES_LEVELS; z++) {
+        rqt_rule_free(plan->level[z].rule);
+        sqlite3_free(plan->ranges[z]);
+    }
     sqlite3_free(plan);
 }
 
-store_query_options plan_options(const tiles *t) {
+store_query_options plan_options(const tiles *t, int z) {
+    const tile_plan *plan = plan_of(t);
     return (store_query_options){.select = RQT_SELECT_THRESHOLD,
                                  .outline = RQT_OUTLINE_TOL,
                                  .metric = RQT_METRIC_EXACT,
                                  .product = RQT_PRODUCT_TRIANGLES,
-                                 .rule = plan_of(t)->rule};
+                                 .rule = plan->level[z].rule ? plan->level[z].rule : plan->rule};
+}
+
+int plan_has_triangle(tiles *t, const rqt_region *region, double eps, const store_query_options *options,
+                      bool *is_there, char **error) {
+    store_limits *limits = store_limits_of(t->store);
+    const int64_t before = limits->triangles;
+    rqt_patch patch = {0};
+    limits->triangles = 1; /* more is not looked for */
+    int code = store_query(t->store, t->terrain, region, eps, options, &patch, NULL, error);
+    limits->triangles = before;
+    *is_there = code == SQLITE_TOOBIG || patch.triangle_count > 0;
+    if (code == SQLITE_TOOBIG) {
+        sqlite3_free(*error);
+        *error = NULL;
+        code = SQLITE_OK;
+    }
+    store_keep(t->store, &patch);
+    return code;
 }
 
 /* ------------------------------------------------------------------------------------------------- places -- */

@@ -35,9 +35,16 @@ int tiles_fail_database(char **error, sqlite3 *db, int code) {
 }
 
 int tiles_check_place(const store_terrain *t, char **error) {
-    if (t->lonlat && t->wgs84 && t->placement.dx > 0 && t->placement.dy < 0) return SQLITE_OK;
-    return tiles_fail(error, "terrain %s has no tiles: they are of terrains in longitude and latitude on WGS 84",
-                      t->name);
+    const double most = 1 + 1e-9; /* a rounding */
+    const geo_extent e = tiles_extent(t);
+    if (!t->lonlat || !t->wgs84 || t->placement.dx <= 0 || t->placement.dy >= 0)
+        return tiles_fail(
+            error, "terrain %s has no tiles: they are of terrains in longitude and latitude on WGS 84", t->name);
+    if (e.east - e.west > 360 * most)
+        return tiles_fail(error, "terrain %s has no tiles: it goes around the Earth more than once", t->name);
+    if (e.north > 90 * most || e.south < -90 * most)
+        return tiles_fail(error, "terrain %s has no tiles: it has latitudes beyond a pole", t->name);
+    return SQLITE_OK;
 }
 
 int tiles_check_heights(const store_terrain *t, bool *is_above_geoid, char **error) {

@@ -108,4 +108,7 @@ if [[ -e $BUILD/librqt.a ]]; then
     fi
 fi
 echo
-echo "The same figures: $OUT/bench.csv"
+echo "Tiles for globes, of another fractal of as many samples"
+RQT=$RQT RQT_SO=$RQT_SO /usr/bin/python3 tests/bench/bench_tiles.py "$side"
+echo
+echo "The same figures but of tiles: $OUT/bench.csv"

@@ -1,6 +1,6 @@
 """Mutants of the tiles: see ../mutants.py."""
 
-TILES = "test_tiles.py"
+TILES, COVERED = "test_tiles.py", "boxes_are_covered_as_the_mesh_covers_them"
 PLAN, MESH, GLOBE, WATER, ENCODE, LAYER, PYRAMID = ("src/tiles/%s.c" % name for name in ("plan", "mesh", "globe", "water", "encode", "layer", "pyramid"))
 
 MUTANTS = [
@@ -30,13 +30,25 @@ MUTANTS = [
     ("tiles: normals of a side are one sample's", GLOBE, "if (weight <= 0) continue;", "if (weight <= 0 || a.count > 0) continue;", TILES, "the mean of those around"),
     ("tiles: heights are the geoid's", PLAN, "    if (is_above_geoid)\n        plan->geoid = frame;\n    else\n        geo_frame_free(frame);", "    geo_frame_free(frame);", TILES, "geoid: no sample"),
     # bytes
-    ("tiles: indices are as they come", MESH, "if (code == SQLITE_OK) code = number_by_use(&mesh->cut);", "", TILES, "as the format has it"),
+    ("tiles: the cut numbers corners as it meets them", "src/core/cut.c",
+     "!take_point(c, l, face->corner[2], &q) ||\n            !take_point(c, l, face->corner[1], &r)", "!take_point(c, l, face->corner[1], &r) ||\n            !take_point(c, l, face->corner[2], &q)",
+     TILES, "as the format has it"),
     ("tiles: an extension has another length", ENCODE, "put_number(w, size + 4, 4);", "put_number(w, size, 4);", TILES, "as the format has it"),
     ("tiles: the water mask begins in the south", WATER, "mask + j * WATER_SIDE", "mask + (WATER_SIDE - 1 - j) * WATER_SIDE", TILES, "the water mask is the sea"),
     ("tiles: water masks are whole", WATER, "== 0 ? 1 :", "== 0 ? WATER_SIDE * WATER_SIDE :", TILES, "one byte of it"),
     # which there are
     ("tiles: rows are counted from the north", LAYER, 'cJSON_AddNumberToObject(range, "startY", ranges[i].y0);', 'cJSON_AddNumberToObject(range, "startY", (1 << z) - 1 - ranges[i].y0);', TILES, "the same tiles"),
     ("tiles: tiles of voids are listed", LAYER, "*is_there = code == SQLITE_TOOBIG || patch.triangle_count > 0;", "*is_there = true;", TILES, "the same tiles"),
+    ("tiles: squares of tiles are there when one is", LAYER, "if (cover == STORE_COVER_UNKNOWN && (r->x0", "if (false && (r->x0", TILES, "no others"),
+    ("tiles: squares are a row short", LAYER, "y1 - y < SQUARE ? y1 : y + SQUARE - 1", "y1 - y < SQUARE ? y1 : y + SQUARE - 2", TILES, "no others"),
+    ("covers: blocks with voids cover all", "src/store/query.c", "!header.has_voids && !header.all_void && all", "!header.all_void && all", "test_store_cover", COVERED),
+    ("covers: blocks with voids cover nothing", "src/store/query.c", "header.all_void) *cover", "(header.all_void || header.has_voids)) *cover", "test_store_cover", COVERED),
+    ("covers: corners beyond a block have data", "src/store/query.c", "i < 2 && answer->number > 1", "i < 0 && answer->number > 1", "test_store_cover", COVERED),
+    ("covers: one block speaks for all", "src/store/query.c", "if (one != *cover) *cover = STORE_COVER_UNKNOWN;", "", "test_store_cover", COVERED),
+    ("covers: blocks answer as without a rule", "src/store/query.c", "if (code == SQLITE_OK && options->rule && rqt_rule_set_eps(options->rule, eps) == RQT_OK)", "if (!options)",
+     "test_store_cover", COVERED),
+    ("rules: rows of a block have the ranks of its first", "src/core/walk.c", "threshold[__builtin_ctz(v | (n - 1))]", "threshold[0]", "test_core_rule", "eps_lowered_by_rank_alone_is_its_definition"),
+    ("normals: a row's metres are those of another", "src/store/normals.c", "if (k->row != row) {", "if (k->row < 0) {", "test_sql_normals.py", "normal"),
     ("tiles: longitudes count once", PLAN, "*last = (int)ceil((e.east + 180) / 360);", "*last = 0;", TILES, "358.5"),
     ("tiles: a tile that touches the raster is listed", PLAN, "return (from > 0 ? from : 0) < (to < last ? to : last);", "return (from > 0 ? from : 0) <= (to < last ? to : last) + (1 << UNIT_BITS);", TILES,
      "the same tiles"),
