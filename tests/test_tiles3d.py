@@ -247,16 +247,18 @@ class Terrain:
 
 
 def measure(t, place, tile, samples, error):
-    """Every sample of the cell beside the mesh: the largest share of what is stated; what has no mesh over it."""
+    """Every sample of the cell beside the mesh: the largest share of what is stated, in space; the samples that have a mesh over
+    them; and the most that one is above or below it where longitude, latitude and height are straight."""
     c0, c1, r0, r1 = t.cell(*place)
     left = {(c, r) for c in range(c0, c1 + 1) for r in range(r0, r1 + 1) if t.raster[r][c] is not None}
-    covered, doubtful, worst = set(), set(), 0.0
+    covered, doubtful, worst, vertical = set(), set(), 0.0, 0.0
     for triangle in tile.triangles:
         if any(samples[v][0] is None for v in triangle):
             continue
         (ac, ar), (bc, br), (cc, cr) = (samples[v] for v in triangle)
         area = (bc - ac) * (cr - ar) - (cc - ac) * (br - ar)
         a, b, c = (tile.xyz[v] for v in triangle)
+        za, zb, zc = t.raster[ar][ac], t.raster[br][bc], t.raster[cr][cc]
         for row in range(min(ar, br, cr), max(ar, br, cr) + 1):
             for col in range(min(ac, bc, cc), max(ac, bc, cc) + 1):
                 nb, nc = (col - ac) * (cr - ar) - (cc - ac) * (row - ar), (bc - ac) * (row - ar) - (col - ac) * (br - ar)
@@ -267,6 +269,7 @@ def measure(t, place, tile, samples, error):
                 covered.add((col, row))
                 wb, wc = nb / abs(area), nc / abs(area)
                 wa = 1 - wb - wc
+                vertical = max(vertical, abs(wa * za + wb * zb + wc * zc - t.raster[row][col]))
                 d = math.dist(t.place(col, row), (wa * a[0] + wb * b[0] + wc * c[0], wa * a[1] + wb * b[1] + wc * c[1], wa * a[2] + wb * b[2] + wc * c[2]))
                 worst = max(worst, d / error) if d <= error else worst
                 if d > error:
@@ -275,7 +278,7 @@ def measure(t, place, tile, samples, error):
     for col, row in doubtful | (left - covered if poles else set()):
         q = t.place(col, row)
         worst = max(worst, min(distance_to_triangle(q, *(tile.xyz[v] for v in triangle)) for triangle in tile.triangles) / error)
-    return worst, left if poles else covered
+    return worst, left if poles else covered, vertical
 
 
 def exact_cover(t, cell):
@@ -331,7 +334,7 @@ def check_terrain(t, is_whole):
     s.equal(name + ": the root's error, halved level by level, is nowhere less than a tile's",
             [p for p in there if there[p][0] > t.set.error / 2**p[0]], [])
     # Errors and vertices, by brute force.
-    worst, level_worst, seen = 0.0, [0.0] * (finest + 1), 0
+    worst, level_worst, seen, lossy = 0.0, [0.0] * (finest + 1), 0, 0.0
     strangers, bare, turned, misses = [], [], [], []
     for p, tile in tiles.items():
         cell = t.cell(*p)
@@ -342,7 +345,7 @@ def check_terrain(t, is_whole):
             if not (cell[0] <= at <= cell[1] and cell[2] <= row <= cell[3]) or t.raster[row][at] is None or \
                     max(abs(d) for d in minus(tile.xyz[v], t.place(at, row))) > step / 2 + 1e-6:
                 strangers.append((p, col, row))
-        share, covered = measure(t, p, tile, samples, there[p][0])
+        share, covered, vertical = measure(t, p, tile, samples, there[p][0])
         worst, level_worst[p[0]], seen = max(worst, share), max(level_worst[p[0]], share), seen + len(covered)
         area = sum((samples[b][0] - samples[a][0]) * (samples[c][1] - samples[a][1]) - (samples[c][0] - samples[a][0]) * (samples[b][1] - samples[a][1])
                    for a, b, c in tile.triangles if None not in (samples[a][0], samples[b][0], samples[c][0]))
@@ -353,6 +356,7 @@ def check_terrain(t, is_whole):
             bare.append((p, area))
         if p[0] == finest and not has_pole:
             expected, count = exact_cover(t, cell)
+            lossy = max(lossy, vertical)
             if covered != expected or -area != count:
                 misses.append((p, len(covered), len(expected), -area, count))
     s.check("%s: no sample is further from a tile in space than it states (%d samples, worst %.3f of it)" % (name, seen, worst), seen > 0 and worst <= 1, level_worst)
@@ -362,6 +366,7 @@ def check_terrain(t, is_whole):
     if is_whole:
         s.equal(name + ": every tile covers its cell, and so children their parent", bare[:5], [])
     s.equal(name + ": the last level has the unit triangles with three valid corners, all of them and no others", misses[:5], [])
+    s.check(name + ": and goes through every sample of theirs", lossy < 1e-6, lossy)
     empty = [p for p in there if p not in tiles and p[0] == finest and exact_cover(t, t.cell(*p))[1]]
     s.equal(name + ": no tile of the last level that has such a triangle is left out", empty, [])
     check_seams(t)
@@ -427,6 +432,18 @@ def is_at_outline(t, p):
     return any(t.raster[r][c] is None for r in range(max(0, row - reach), min(t.height, row + reach + 1)) for c in range(max(0, col - reach), min(t.width, col + reach + 1)))
 
 
+def check_levels(t, k):
+    """What levels are off, from the errors of all vertices: half a metre, and what is there beyond the grids of the blocks."""
+    db = s.connect(t.database)
+    errors = s.rows(db, "SELECT level, error FROM rqt_range(NULL, 0) WHERE error < 9e999")
+    db.close()
+    told, steps = t.set.json["extras"]["rqt"]["errors"], t.set.json["extras"]["rqt"]["steps"]
+    em = [max([e for level, e in errors if level > l + k], default=0) for l in range(len(told) + 2)]
+    cell = math.radians(max(t.dx, -t.dy)) * A
+    wanted = [0.5 + max(em[l + 2], min(max(em[l + 1], em[l] / 4), cell * 2**(len(told) - 1 - l) / 4)) + steps[l] * math.sqrt(3) / 2 for l in range(len(told) - 1)]
+    s.check(t.name + ": levels are off by what their vertices say", len(told) > 4 and max(abs(a - b) for a, b in zip(told, wanted)) < 1e-5, (told, wanted))
+
+
 def window(name, source, *box):
     path = s.temp(name + ".tif")
     s.run(["gdal_translate", "-q", "-srcwin", *map(str, box), os.path.join(s.DATA, source), path])
@@ -442,6 +459,7 @@ def terrain(name, path, is_whole=True, raster=None, **imports):
 
 ALPS = terrain("alps", window("alps", "glarus_1arc_native_161.tif", 30, 40, 85, 73), block=3)
 check_normals(ALPS)
+check_levels(ALPS, 3)
 AFRICA = terrain("africa", window("africa", "eastafrica.tif", 40, 60, 90, 110), block=4)
 zipped = s.temp("n42")
 s.run(["unzip", "-q", "-o", os.path.join(s.DATA, "N42E001.hgt.zip"), "-d", zipped])

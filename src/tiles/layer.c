@@ -51,7 +51,7 @@ static int probe(tiles *t, int z, int32_t x, int32_t y, bool *is_there, char **e
 /* How much of the tiles has triangles: all, nothing, or who knows. */
 static int find_cover(tiles *t, int z, const tile_range *r, store_cover *cover, char **error) {
     const rqt_lattice *lattice = &t->terrain->lattice;
-    const store_query_options options = plan_options(t);
+    const store_query_options options = plan_options(t, z);
     tile_place first, last; /* south-west, north-east */
     *cover = STORE_COVER_UNKNOWN;
     if (!plan_place(t, z, r->x0, r->y0, &first) || !plan_place(t, z, r->x1, r->y1, &last)) return SQLITE_OK;
