@@ -7,7 +7,7 @@ MUTANTS = [
     # errors
     ("tiles: the mesh is too coarse", MESH, "region, plan_of(t)->level", "region, 1.5 * plan_of(t)->level", TILES,
      "no sample is further above or below"),
-    ("tiles: curvature takes nothing", PLAN, "if (status == RQT_OK) status = rqt_rule_set_lowering(plan->rule, lowering);", "", TILES, "africa: no sample is further from a tile in space"),
+    ("tiles: curvature takes nothing", PLAN, "if (status == RQT_OK) status = rqt_rule_set_lowering(*rule, plan_of(t)->lowering);", "", TILES, "africa: no sample is further from a tile in space"),
     ("tiles: vertices do not move", MESH, "mesh->error = eps + moved * (1 + 1e-9) + 1e-7;", "mesh->error = eps + 0 * moved;", TILES, "no sample is further from a tile in space"),
     ("tiles: slopes do not count", MESH, "eps + mesh->move[2] + sloping * (1 + 1e-9) + 1e-7;", "eps + mesh->move[2] + 0 * sloping;", TILES, "no sample is further above or below"),
     ("tiles: quantisation takes no part of a level's error", PLAN, "level->eps = level->geometric_error - move;", "level->eps = level->geometric_error;", TILES,
@@ -38,7 +38,7 @@ MUTANTS = [
     ("tiles: water masks are whole", WATER, "== 0 ? 1 :", "== 0 ? WATER_SIDE * WATER_SIDE :", TILES, "one byte of it"),
     # which there are
     ("tiles: rows are counted from the north", LAYER, 'cJSON_AddNumberToObject(range, "startY", ranges[i].y0);', 'cJSON_AddNumberToObject(range, "startY", (1 << z) - 1 - ranges[i].y0);', TILES, "the same tiles"),
-    ("tiles: tiles of voids are listed", LAYER, "*is_there = code == SQLITE_TOOBIG || patch.triangle_count > 0;", "*is_there = true;", TILES, "the same tiles"),
+    ("tiles: tiles of voids are listed", PLAN, "*is_there = code == SQLITE_TOOBIG || patch.triangle_count > 0;", "*is_there = true;", TILES, "the same tiles"),
     ("tiles: squares of tiles are there when one is", LAYER, "if (cover == STORE_COVER_UNKNOWN && (r->x0", "if (false && (r->x0", TILES, "no others"),
     ("tiles: squares are a row short", LAYER, "y1 - y < SQUARE ? y1 : y + SQUARE - 1", "y1 - y < SQUARE ? y1 : y + SQUARE - 2", TILES, "no others"),
     ("covers: blocks with voids cover all", "src/store/query.c", "!header.has_voids && !header.all_void && all", "!header.all_void && all", "test_store_cover", COVERED),
