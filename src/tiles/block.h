@@ -65,10 +65,9 @@ void block_region(const tiles *t, block_tile tile, const store_relief *relief, d
  * east across the antimeridian. */
 void block_rectangle(double west, double south, double east, double north, double region[4]);
 
-/* The mesh of a tile, to be released with store_keep; without a triangle where the tile has no content. part: 1, or
- * of the north-western corner alone, its side so large a part of the tile's, a power of two. At most `most`
- * triangles are looked for, 0: all; more are SQLITE_TOOBIG. */
-int block_query(tiles *t, block_tile tile, int32_t part, int64_t most, rqt_patch *patch, char **error);
+/* Has the mesh of a tile a triangle in the north-western corner of its cell, whose side is so large a part of the
+ * cell's, a power of two? 1: in all of it. */
+int block_has_triangle(tiles *t, block_tile tile, int32_t part, bool *has, char **error);
 
 typedef struct block_mesh {
     rqt_patch patch;
@@ -76,6 +75,7 @@ typedef struct block_mesh {
     int32_t *offset;  /* three a vertex: steps from there, less than 2^24 */
     int8_t *normal;   /* three a vertex, geocentric: 127ths */
 } block_mesh;
+/* Without a triangle where the tile has no content. */
 int block_mesh_make(tiles *t, block_tile tile, block_mesh *mesh, char **error);
 void block_mesh_free(tiles *t, block_mesh *mesh);
 

@@ -42,30 +42,50 @@ static int make_rule(const tiles *t, block_tile tile, rqt_rule **rule) {
     return status == RQT_OK ? SQLITE_OK : SQLITE_NOMEM;
 }
 
-int block_query(tiles *t, block_tile tile, int32_t part, int64_t most, rqt_patch *patch, char **error) {
-    const block_plan *plan = block_plan_of(t);
+/* What to ask for the mesh of the north-western corner of a cell, its side so large a part of the cell's. Released
+ * by end_query, whatever came of it. */
+typedef struct cell_query {
+    rqt_region *region;
+    store_query_options options;
+} cell_query;
+
+static int begin_query(const tiles *t, block_tile tile, int32_t part, cell_query *q) {
     const int32_t side = 1 << (t->terrain->lattice.K - tile.level);
-    const rqt_square cell = {tile.i * side, tile.j * side, side / part};
-    store_limits *limits = store_limits_of(t->store);
-    const int64_t before = limits->triangles;
-    store_query_options options = {.select = RQT_SELECT_THRESHOLD,
-                                   .outline = tile.level == plan->finest ? RQT_OUTLINE_EXACT : RQT_OUTLINE_TOL,
-                                   .metric = RQT_METRIC_EXACT,
-                                   .product = RQT_PRODUCT_TRIANGLES};
-    rqt_region *region = NULL;
-    *patch = (rqt_patch){0};
-    int code = make_rule(t, tile, &options.rule);
-    if (code == SQLITE_OK &&
-        rqt_region_of_squares(&cell, 1, &t->terrain->lattice, store_allocator(), &region) != RQT_OK)
-        code = SQLITE_NOMEM;
-    if (code == SQLITE_OK) {
-        if (most > 0) limits->triangles = most;
-        code =
-            store_query(t->store, t->terrain, region, plan->level[tile.level].error, &options, patch, NULL, error);
-        limits->triangles = before;
-    }
-    rqt_region_free(region);
-    rqt_rule_free(options.rule);
+    const rqt_square square = {tile.i * side, tile.j * side, side / part};
+    const bool is_last = tile.level == block_plan_of(t)->finest;
+    *q = (cell_query){.options = {.select = RQT_SELECT_THRESHOLD,
+                                  .outline = is_last ? RQT_OUTLINE_EXACT : RQT_OUTLINE_TOL,
+                                  .metric = RQT_METRIC_EXACT,
+                                  .product = RQT_PRODUCT_TRIANGLES}};
+    const int code = make_rule(t, tile, &q->options.rule);
+    if (code != SQLITE_OK) return code;
+    const rqt_status status =
+        rqt_region_of_squares(&square, 1, &t->terrain->lattice, store_allocator(), &q->region);
+    return status == RQT_OK ? SQLITE_OK : SQLITE_NOMEM;
+}
+
+static void end_query(cell_query *q) {
+    rqt_region_free(q->region);
+    rqt_rule_free(q->options.rule);
+}
+
+static int query(tiles *t, block_tile tile, rqt_patch *patch, char **error) {
+    cell_query q;
+    int code = begin_query(t, tile, 1, &q);
+    if (code == SQLITE_OK)
+        code = store_query(t->store, t->terrain, q.region, block_plan_of(t)->level[tile.level].error, &q.options,
+                           patch, NULL, error);
+    end_query(&q);
+    return code;
+}
+
+int block_has_triangle(tiles *t, block_tile tile, int32_t part, bool *has, char **error) {
+    cell_query q;
+    *has = false;
+    int code = begin_query(t, tile, part, &q);
+    if (code == SQLITE_OK)
+        code = plan_has_triangle(t, q.region, block_plan_of(t)->level[tile.level].error, &q.options, has, error);
+    end_query(&q);
     return code;
 }
 
@@ -165,7 +185,7 @@ static int place_mesh(tiles *t, block_tile tile, block_mesh *mesh, char **error)
 
 int block_mesh_make(tiles *t, block_tile tile, block_mesh *mesh, char **error) {
     *mesh = (block_mesh){0};
-    int code = block_query(t, tile, 1, 0, &mesh->patch, error);
+    int code = query(t, tile, &mesh->patch, error);
     if (code == SQLITE_OK && mesh->patch.triangle_count > 0) code = place_mesh(t, tile, mesh, error);
     return code;
 }

@@ -45,20 +45,6 @@ bool block_exists(const tiles *t, block_tile tile) {
     return rqt_block_locate(&t->terrain->lattice, t->terrain->k, number_of(tile), &place) == RQT_OK;
 }
 
-/* Has the mesh a triangle in the north-western corner of the cell, its part-th part a side? */
-static int probe(tiles *t, block_tile tile, int32_t part, bool *has, char **error) {
-    rqt_patch patch = {0};
-    int code = block_query(t, tile, part, 1, &patch, error);
-    *has = code == SQLITE_TOOBIG || patch.triangle_count > 0;
-    if (code == SQLITE_TOOBIG) {
-        sqlite3_free(*error);
-        *error = NULL;
-        code = SQLITE_OK;
-    }
-    store_keep(t->store, &patch);
-    return code;
-}
-
 /* A block is walked whole before it is asked whether that is enough: a corner takes less, and most have one. */
 int block_has_content(tiles *t, block_tile tile, const store_relief *relief, bool *has, char **error) {
     const rqt_lattice *lattice = &t->terrain->lattice;
@@ -66,7 +52,7 @@ int block_has_content(tiles *t, block_tile tile, const store_relief *relief, boo
     if (!relief->is_mixed) return SQLITE_OK;
     int code = SQLITE_OK;
     for (int32_t part = CORNER; part > 0 && code == SQLITE_OK && !*has; part = part > 1 ? 1 : 0)
-        if (part <= 1 << (lattice->K - tile.level)) code = probe(t, tile, part, has, error);
+        if (part <= 1 << (lattice->K - tile.level)) code = block_has_triangle(t, tile, part, has, error);
     return code;
 }
 

@@ -6,7 +6,7 @@ RELIEF = "src/store/relief.c"
 
 MUTANTS = [
     # errors
-    ("3d-tiles: the mesh is too coarse", MESH, "plan->level[tile.level].error, &options", "1.1 * plan->level[tile.level].error, &options", TILES, "no sample is further"),
+    ("3d-tiles: the mesh is too coarse", MESH, "level[tile.level].error, &q.options,\n                           patch", "level[tile.level].error * 1.1, &q.options,\n                           patch", TILES, "no sample is further"),
     ("3d-tiles: curvature takes nothing", MESH, ": tile.level == plan->finest ? error : sag;", ": tile.level == plan->finest ? error : 0;", TILES, "africa: no sample is further"),
     ("3d-tiles: rank by rank curvature takes any share", MESH, "sag + terrain->quantum_error <= error;", "sag * 0 + terrain->quantum_error <= error;", TILES, "no sample is further"),
     ("3d-tiles: a tile forgets the curvature of its halves", TILE, "rqt_code_metres(relief->error) + level->centre;", "rqt_code_metres(relief->error);", TILES, "no sample is further"),
@@ -29,7 +29,7 @@ MUTANTS = [
     ("3d-tiles: longitudes go on beyond 180", TILE, "if (east > 180) east", "if (east > 1000) east", TILES, "regions are on the globe"),
     # availability
     ("3d-tiles: every tile has content", TILE, "if (!relief->is_mixed) return SQLITE_OK;", "*has = true;\n    return SQLITE_OK;", TILES, "holes"),
-    ("3d-tiles: no mixed tile has content", TILE, "*has = code == SQLITE_TOOBIG || patch.triangle_count > 0;", "*has = false;", TILES, "holes"),
+    ("3d-tiles: no mixed tile has content", TILE, "code = block_has_triangle(t, tile, part, has, error);", "code = SQLITE_OK;", TILES, "holes"),
     ("3d-tiles: a cell without an outline is all valid", RELIEF, "relief->is_valid = summary->corner[0].flags & RQT_VALID;", "relief->is_valid = true;", TILES, "holes"),
     ("3d-tiles: bits are counted from the other end", SUBTREE, "(uint8_t)(1 << i % 8)", "(uint8_t)(128 >> i % 8)", TILES, "as the formats have them"),
     ("3d-tiles: x and y change places", SUBTREE, "x |= (m >> 2 * bit & 1) << bit;", "x |= (m >> (2 * bit + 1) & 1) << bit;", TILES, "as the formats have them"),
