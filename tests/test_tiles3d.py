@@ -486,6 +486,9 @@ flat = [[0 if col < 40 else 3 * (col - 39) for col in range(65)] for _ in range(
 PLAIN = terrain("plain", s.write_grid(s.temp("plain.asc"), flat, 5, 43, 1 / 3600, s.WGS84), raster=flat, block=4)
 s.equal("plain: a tile of sea has two triangles, and states centimetres",
         [(len(PLAIN.tiles[2, 0, 0].triangles), PLAIN.set.there[2, 0, 0][0] < 0.1)], [(2, True)])
+# Heights of millimetres: less than curvature may take, and not left out for that.
+gentle = [[z / 1000 for z in row[:33]] for row in s.rough_grid(33, 33, 5, relief=60)]
+terrain("gentle", s.write_grid(s.temp("gentle.asc"), gentle, 8, 46, 1 / 3600, s.WGS84), raster=gentle, block=3)
 terrain("sliver", s.write_grid(s.temp("sliver.asc"), [row[:2] for row in hill], 7, 47, 1 / 1200, s.WGS84), raster=[row[:2] for row in hill], block=2)
 
 # ------------------------------------------------------------------------------------------------------------ the service

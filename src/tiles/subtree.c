@@ -157,7 +157,7 @@ static int encode(const subtree *s, tile_bytes *out) {
     cJSON_Delete(json);
     const size_t length = text ? strlen(text) : 0, padded = (length + 7) / 8 * 8;
     *out = (tile_bytes){.bytes = text ? sqlite3_malloc64(HEAD + padded + b.size) : NULL};
-    if (out->bytes) {
+    if (text && out->bytes) {
         memcpy(out->bytes, "subt", 4);
         put(out->bytes + 4, 1, 4);
         put(out->bytes + 8, padded, 8);

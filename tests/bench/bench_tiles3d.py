@@ -65,6 +65,9 @@ def ask(database, tiles):
             level = sorted(place for place in tiles if place[0] == z)
             some = level[::max(1, len(level) // ASKED)]
             first = [get(place) for place in some]
+            for _ in range(AGAIN): # each worker of the service has what it has read
+                for place in some:
+                    get(place)
             again = [statistics.median(get(place) for _ in range(AGAIN)) for place in some]
             of = [tiles[place] for place in level]
             print("  %5d %6d %10.0f %9.0f %9.2f %9.2f %9.2f %9.2f" % (z, len(level), statistics.mean(t[1] for t in of), statistics.mean(t[0] for t in of),
