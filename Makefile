@@ -163,14 +163,14 @@ fuzz-programs: $(FUZZERS:%=$(BUILD)/tests/fuzz/%)
 
 test: ## install, build, and pass every test (also under ASan and UBSan)
 	@./src/install-packages.sh build test
-	@$(MAKE) --no-print-directory -j2 products test-programs
+	@$(MAKE) --no-print-directory -j2 products test-programs $(BUILD)/tests/verify_tiles
 	@$(MAKE) --no-print-directory -j2 BUILD=$(BUILD)/sanitized OPTIMIZE=-O1 \
 	  SANITIZE="-fsanitize=address,undefined -fno-sanitize-recover=undefined" test-programs fuzz-programs
 	@BUILD=$(BUILD) ./tests/run.sh
 
 test-quick: ## the tests without the sanitized build
 	@./src/install-packages.sh build test
-	@$(MAKE) --no-print-directory -j2 products test-programs
+	@$(MAKE) --no-print-directory -j2 products test-programs $(BUILD)/tests/verify_tiles
 	@BUILD=$(BUILD) ./tests/run.sh quick
 
 .PHONY: test-qgis
@@ -224,7 +224,7 @@ fuzz: ## every fuzzer for SECONDS=60 each, steered by libFuzzer, under ASan and 
 .PHONY: mutants
 mutants: ## break the code in one line, many times over: each time a named test must go red
 	@./src/install-packages.sh build test web browser
-	@$(MAKE) --no-print-directory -j2 products test-programs
+	@$(MAKE) --no-print-directory -j2 products test-programs $(BUILD)/tests/verify_tiles
 	@./tests/web/install.sh
 	@/usr/bin/python3 tests/mutants.py $(BUILD)
 
@@ -253,7 +253,7 @@ check-layers: ## modules depend one way only; librqt.a and rqt.so mention only w
 	@$(MAKE) --no-print-directory -j2 products
 	@BUILD=$(BUILD) ./tests/check_layers.sh
 
-FORMATTED = $(wildcard src/*/*.[ch] src/geo/*.cpp ext/*.[ch] tests/*.[ch] tests/web/*.[ch] tests/fuzz/*.[ch] tests/bench/*.[ch] tests/bench/peers/*.[ch])
+FORMATTED = $(wildcard src/*/*.[ch] src/geo/*.cpp ext/*.[ch] tests/*.[ch] tests/*.cpp tests/web/*.[ch] tests/fuzz/*.[ch] tests/bench/*.[ch] tests/bench/peers/*.[ch])
 .PHONY: format check-format
 format: ## lay the sources out (clang-format)
 	@./src/install-packages.sh format

@@ -497,8 +497,8 @@ s.check("the geoid is some 50 m above the ellipsoid there", all(40 < raised[r][c
 terrain("geoid", geoid, raster=raised, block=3)
 
 # Heights of millimetres: less than curvature may take, and not left out for that.
-gentle = [[z / 1000 for z in row[:33]] for row in s.rough_grid(33, 33, 5, relief=60)]
-terrain("gentle", s.write_grid(s.temp("gentle.asc"), gentle, 8, 46, 1 / 3600, s.WGS84), raster=gentle, block=3)
+gentle = [[z / 1000 for z in row[:33]] for row in s.rough_grid(33, 33, 5, relief=400)]
+terrain("gentle", s.write_grid(s.temp("gentle.asc"), gentle, 8, 46, 1 / 300, s.WGS84), raster=gentle, block=3)
 terrain("sliver", s.write_grid(s.temp("sliver.asc"), [row[:2] for row in hill], 7, 47, 1 / 1200, s.WGS84), raster=[row[:2] for row in hill], block=2)
 
 # ------------------------------------------------------------------------------------------------------------ the service

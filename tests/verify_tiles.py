@@ -74,7 +74,13 @@ def judge_service(database, terrain, folder):
         answer = server.ask(root + path_of(tile))
         if answer.status != 200 or answer.body != files.get(path_of(tile)) or answer.content_type != "application/vnd.quantized-mesh":
             faults.append("%s is served as %d bytes of %s, status %d" % (path_of(tile), len(answer.body), answer.content_type, answer.status))
-    deepest = max(tiles)[0]
+    # As CesiumJS and cesium-native ask for it.
+    any_tile = max(tiles)
+    answer = server.ask(root + path_of(any_tile) + "?extensions=octvertexnormals-metadata&v=1.0.0", headers={
+        "Accept": "application/vnd.quantized-mesh;extensions=octvertexnormals-metadata,application/octet-stream;q=0.9,*/*;q=0.01", "Accept-Encoding": "gzip"})
+    if answer.status != 200 or answer.content_encoding != "gzip" or gzip.decompress(answer.body) != files.get(path_of(any_tile)):
+        faults.append("%s with the extensions that clients ask for: status %d" % (path_of(any_tile), answer.status))
+    deepest = any_tile[0]
     beside = {(z, x + i, y + j) for z, x, y in tiles for i in (-1, 0, 1) for j in (-1, 0, 1)} | {(z, x, y) for z in range(4) for x in range(2 << z) for y in range(1 << z)}
     beside |= {(deepest + 1, 2 * x, 2 * y) for z, x, y in tiles if z == deepest}
     for tile in sorted(t for t in beside - tiles if min(t) >= 0):

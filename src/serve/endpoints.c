@@ -30,7 +30,7 @@ const endpoint endpoints[] = {
     {"explain", TERRAIN "/explain", REGION "eps! " OPTION_NAMES, answer_explain, false},
     {"area", TERRAIN "/area", REGION "eps! " OPTION_NAMES, answer_area, false},
     {"layer", TERRAIN "/tiles/quantized-mesh/layer.json", " ", answer_tile_document, false},
-    {"tile", TERRAIN "/tiles/quantized-mesh/{z}/{x}/{y}.terrain", " ", answer_tile, false},
+    {"tile", TERRAIN "/tiles/quantized-mesh/{z}/{x}/{y}.terrain", " extensions v ", answer_tile, false},
     {"tileset", TERRAIN "/tiles/3d-tiles/tileset.json", " ", answer_tile_document, false},
     {"content", TERRAIN "/tiles/3d-tiles/content/{z}/{x}/{y}.glb", " ", answer_tile, false},
     {"subtree", TERRAIN "/tiles/3d-tiles/subtrees/{z}/{x}/{y}.subtree", " ", answer_tile, false},
