@@ -21,10 +21,11 @@
  * At em(l) the mesh of a tile is of its block's own grid. But em(l) is that of the worst place, and leaves a few
  * per cent of the grid; a spike, a cliff, and the outline of voids, whose error is ground, would make all of a
  * level coarse. So E is less, and in such places the mesh goes on to what is finer, as far as the grid of the
- * blocks two levels below: a tile has at most so many vertices, whatever the terrain. (Measured on four real DEMs,
- * tiles of 128 x 128 samples: 1000 to 5000 vertices a tile on all levels but the last.) The last level is the
- * terrain: every vertex with an error is in, and the outline of voids is exact. E does not grow from level to
- * level, as em, B and strides do not.
+ * blocks two levels below: a tile has at most so many vertices, whatever the terrain. Measured on squares
+ * of one degree, 1201 x 1201 samples in blocks of 128, all levels but the last: 1000 to 2000 vertices a tile in New
+ * Hampshire, which has no voids; 5000 to 9000 in the Pyrenees, 9000 to 27,000 in the Alps, which have. The last
+ * level is the terrain: every vertex with an error is in, and the outline of voids is exact. E does not grow from
+ * level to level, as em, B and strides do not.
  *
  * em(l) only says what to ask for. That nothing is off by more than E(l) is what the rule sees to, block by block:
  * an index that lies changes how large tiles are, and not what is true.
