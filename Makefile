@@ -25,9 +25,12 @@ PICTURE = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/picture/*.c src/text/*.
 TILES = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/tiles/*.c))
 SERVE = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/serve/*.c)) $(BUILD)/generated/web_files.o
 CLI = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/cli/*.c))
-# What the query service has in it: the page, and what it says of itself. The page is the same in every build.
+# What the query service has in it: its pages, and what it says of itself. The pages are the same in every build.
 WEB = build/web
-WEB_FILES = $(WEB)/index.html $(WEB)/viewer.css $(WEB)/viewer.js $(WEB)/decoder.js src/serve/openapi.json
+VIEWER_FILES = $(addprefix $(WEB)/,index.html viewer.css viewer.js decoder.js)
+CESIUM_FILES = $(addprefix $(WEB)/,cesium.html cesium.css cesium.js cesium-licence.md $(CESIUM_WORKERS:%=%.js))
+CESIUM_WORKERS = createVerticesFromQuantizedTerrainMesh upsampleQuantizedTerrainMesh incrementallyBuildTerrainPicker transferTypedArrayTest
+WEB_FILES = $(VIEWER_FILES) $(CESIUM_FILES) src/serve/openapi.json
 GENERATED = $(BUILD)/generated/schema_sql.h
 
 LIBS_CORE = -lzstd -lm
@@ -80,10 +83,13 @@ $(BUILD)/serve/%.o: src/serve/%.c
 	@echo "  compile $<"; $(CC) $(CFLAGS) $(INCLUDES) -DSQLITE_CORE -c $< -o $@
 $(WEB)/viewer.js: $(wildcard src/web/*) src/web/.npmrc
 	@echo "  bundle $@"; ./src/web/bundle.sh $(WEB) build/web-packages
-$(filter-out $(WEB)/viewer.js,$(filter $(WEB)/%,$(WEB_FILES))): $(WEB)/viewer.js ;
+$(filter-out $(WEB)/viewer.js,$(VIEWER_FILES)): $(WEB)/viewer.js ;
+$(WEB)/cesium.js: $(wildcard src/web/cesium/*) src/web/cesium/.npmrc src/web/format.js src/web/ramps.js src/web/service.js src/web/without.js
+	@echo "  bundle $@"; ./src/web/cesium/bundle.sh $(WEB) build/cesium-packages $(CESIUM_WORKERS)
+$(filter-out $(WEB)/cesium.js,$(CESIUM_FILES)): $(WEB)/cesium.js ;
 $(BUILD)/generated/web_files.c: src/serve/embed.sh $(WEB_FILES)
 	@mkdir -p $(@D)
-	@./src/serve/embed.sh $(WEB_FILES) > $@
+	@./src/serve/embed.sh $(@D)/web $(WEB_FILES) > $@
 $(BUILD)/generated/web_files.o: $(BUILD)/generated/web_files.c
 	@$(CC) $(CFLAGS) $(INCLUDES) -c $< -o $@
 $(BUILD)/cli/%.o: src/cli/%.c $(GENERATED)

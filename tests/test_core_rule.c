@@ -30,7 +30,7 @@ static void rules_equal_their_definition_on_larger_rasters(void **state) {
 static void eps_lowered_by_rank_alone_is_its_definition(void **state) {
     (void)state;
     random_begin("lowered");
-    for (int n = 0; n < 60; n++) {
+    for (int n = 0; n < 30; n++) {
         trial *t = trial_create(random_between(1, 36), random_between(1, 36), 0);
         const double step = t->eps * random_unit() / 4;
         t->places = t->forced_count = 0;

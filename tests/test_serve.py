@@ -205,6 +205,13 @@ with open(os.path.join(s.ROOT, "src", "serve", "openapi.json"), "rb") as f:
     source = f.read()
 answer = ask("/openapi.json")
 equal("/openapi.json is the document of src/serve", (answer.content_type, answer.body), ("application/vnd.oai.openapi+json;version=3.0", source))
+for header, expected in (("gzip", "gzip"), ("gzip, zstd", "gzip"), ("gzip;q=0.5, zstd", "zstd"), ("identity", None)):
+    answer = ask("/openapi.json", headers={"Accept-Encoding": header})
+    body = gzip.decompress(answer.body) if answer.content_encoding == "gzip" else answer.body
+    check("what is compiled in is gzipped already: %s is answered in %s" % (header, expected), answer.content_encoding == expected and (expected == "zstd" or body == source), answer.headers)
+answer = ask("/cesium", {"terrain": "hills"}, headers={"Accept": browser})
+equal("/cesium is a page for browsers", (answer.content_type, b"<!doctype html>" in answer.body.lower()), ("text/html; charset=utf-8", True))
+check("which may load nothing from elsewhere, and compile nothing", "default-src 'self'" in (answer.content_security_policy or "") and "eval" not in answer.content_security_policy, answer.headers)
 check("/conformance names classes of OGC API", any("ogcapi-common-1/1.0/conf/core" in c for c in ask("/conformance").json()["conformsTo"]))
 answer = ask("/collections").json()
 equal("/collections lists the terrains", [c["id"] for c in answer["collections"]], ["hills", "plain"])

@@ -131,6 +131,16 @@ def listed(layer):
             for y in range(r["startY"], r["endY"] + 1) for x in range(r["startX"], r["endX"] + 1)]
 
 
+def told_by(roots):
+    """Every tile that those of level 0 tell of: z,x,y; -1,x,y when it is in the other half of the globe."""
+    found = []
+    for half, root in roots.items():
+        for z, ranges in enumerate(root.metadata["available"], 1):
+            found += [(z if x >> z == half else -1, x, y) for r in ranges
+                      for y in range(r["startY"], r["endY"] + 1) for x in range(r["startX"], r["endX"] + 1)]
+    return found
+
+
 def files(folder):
     found = {}
     for path, _, names in os.walk(folder):
@@ -149,14 +159,15 @@ class Pyramid:
         s.equal(name + ": rqt tiles says nothing in a pipe", (out, status), ("", 0))
         with open(os.path.join(self.folder, "layer.json"), encoding="utf-8") as f:
             self.layer = json.load(f)
-        self.tiles = {}
+        self.tiles, self.empty = {}, {} # those with terrain in them, and those of level 0 without
         if "--gzip" in options:
             if not s.equal(name + ": all tiles are compressed", {data[:2] for path, data in files(self.folder).items() if path.endswith(".terrain")}, {b"\x1f\x8b"}):
                 s.finish()
         for path, data in files(self.folder).items():
             if path.endswith(".terrain"):
                 z, x, y = map(int, path[:-len(".terrain")].split("/"))
-                self.tiles[z, x, y] = Tile(z, x, y, gzip.decompress(data) if "--gzip" in options else data)
+                tile = Tile(z, x, y, gzip.decompress(data) if "--gzip" in options else data)
+                (self.empty if z == 0 and tile.problem is None and not tile.triangles else self.tiles)[z, x, y] = tile
         self.space = {}
 
     def sample(self, col, row):
@@ -311,7 +322,11 @@ def check_pyramid(p, is_whole, vertices_too=True):
     every = list(tiles.values())
     if not s.equal(name + ": every tile is as the format has it", [(t.z, t.x, t.y, t.problem) for t in every if t.problem], []):
         s.finish()
-    s.equal(name + ": listed and there are the same tiles, each once", sorted(listed(p.layer)), sorted(tiles))
+    s.equal(name + ": listed and there are the same tiles, each once", sorted(listed(p.layer)), sorted([*tiles, *p.empty]))
+    roots = {t.x: t for t in [*every, *p.empty.values()] if t.z == 0}
+    s.equal(name + ": both tiles of level 0 are there, one without terrain is empty", (sorted(roots), [t.count for t in p.empty.values()]), ([0, 1], [0] * len(p.empty)))
+    s.equal(name + ": ... and each tells of those below it, so that all that are there are told of", sorted(told_by(roots)), sorted(k for k in tiles if k[0] > 0))
+    s.equal(name + ": ... as clients are told that they do", p.layer["metadataAvailability"], len(p.layer["available"]))
     s.equal(name + ": every tile has a triangle", [(t.z, t.x, t.y) for t in every if not t.triangles], [])
     wrong = [(t.z, t.x, t.y, side) for t in every for side, (axis, value) in enumerate(SIDES)
              if sorted(t.edges[side]) != [i for i, n in enumerate(getattr(t, axis)) if n == value]]
@@ -508,7 +523,7 @@ for row in range(1150):
         if row % 200 > 90 + col or (col - 30) ** 2 + (row - 480) ** 2 < 60:
             tall[row][col] = None
 TALL = pyramid("tall", s.write_grid(s.temp("tall.asc"), tall, 30.01, 44.02, 1 / 1200, s.WGS84), tall, block=3)
-s.equal("tall: layer.json lists the same tiles", sorted(listed(TALL.layer)), sorted(TALL.tiles))
+s.equal("tall: layer.json lists the same tiles", sorted(listed(TALL.layer)), sorted([*TALL.tiles, *TALL.empty]))
 listed_exactly(TALL, False)
 
 # Longitudes beyond 180: the same places by another name.
@@ -607,6 +622,10 @@ with open(packed + "/layer.json", encoding="utf-8") as f:
     some = json.load(f)
 s.equal("... and a layer.json of the levels asked for", (some["minzoom"], some["maxzoom"], some["available"][2], some["available"][3:10]),
         (3, 9, [], COAST.layer["available"][3:10]))
+top = s.temp("top")
+s.equal("--levels 0-4", s.run([s.RQT, "tiles", COAST.database, "-o", top, "--levels", "0-4"]), ("", 0))
+roots = {x: Tile(0, x, 0, files(top)["0/%d/0.terrain" % x]) for x in (0, 1)}
+s.equal("... has tiles of level 0 that tell of no others than there are", sorted(told_by(roots)), sorted(k for k in COAST.tiles if 0 < k[0] <= 4))
 flat = s.temp("flat.gpkg")
 s.import_terrain(flat, s.write_grid(s.temp("flat.asc"), s.rough_grid(9, 9, 1)), name="flat")
 for arguments, sentence, expected in (
@@ -646,7 +665,7 @@ answer = server.ask(root + "%d/%d/%d.terrain" % key, headers={
 s.equal("... as clients ask for it", (answer.status, answer.content_type, answer.content_encoding, gzip.decompress(answer.body)),
         (200, "application/vnd.quantized-mesh", "gzip", whole["%d/%d/%d.terrain" % key]))
 s.equal("... and not again when they have it", server.ask(root + "%d/%d/%d.terrain" % key, headers={"Accept-Encoding": "gzip", "If-None-Match": answer.etag}).status, 304)
-around = {(z, x + i, y + j) for z, x, y in COAST.tiles for i in (-1, 0, 1) for j in (-1, 0, 1)} - set(COAST.tiles)
+around = {(z, x + i, y + j) for z, x, y in COAST.tiles for i in (-1, 0, 1) for j in (-1, 0, 1)} - set(COAST.tiles) - set(COAST.empty)
 s.equal("tiles that are not listed are not there",
         [t for t in sorted(around) if min(t) >= 0 and server.ask(root + "%d/%d/%d.terrain" % t).status != 404], [])
 for path in ("13/0/0.terrain", "99999999/1/0.terrain", "0/2/0.terrain", "0/1/1.terrain", "00/1/0.terrain", "0/01/0.terrain", "0/1/0", "0/1/.terrain",

@@ -555,7 +555,7 @@ void Judge::judge_level(int z, const std::vector<Key> &keys) {
         const Decoder decoder(bytes, z, x, y);
         verdict.see(format, decoder.tile.problem.empty(),
                     [&] { return name_of(decoder.tile) + ": " + decoder.tile.problem; });
-        if (decoder.tile.problem.empty()) judge_tile(decoder.tile);
+        if (decoder.tile.problem.empty() && decoder.tile.count() > 0) judge_tile(decoder.tile);
     }
     judge_cover(z);
     judge_neighbours(z);

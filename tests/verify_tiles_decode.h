@@ -156,7 +156,7 @@ class Decoder {
         }
         if (highest != tile.count())
             fail(std::to_string(tile.count()) + " vertices, of which triangles use " + std::to_string(highest));
-        if (n == 0) fail("no triangle");
+        if (n == 0 && tile.z > 0) fail("no triangle"); /* both tiles of level 0 are there */
         for (auto &edge : tile.edges) {
             const uint32_t m = take<uint32_t>();
             if (!has(m, wide)) return;
@@ -180,9 +180,10 @@ class Decoder {
         if (tile.normals.size() != 2 * tile.count()) fail("normals for another number of vertices");
         if (!tile.water.empty() && tile.water.size() != 1 && tile.water.size() != 65536)
             fail("a water mask of " + std::to_string(tile.water.size()) + " bytes");
-        for (double d :
-             {tile.geometric_error, tile.error, tile.vertical_error, tile.lowest, tile.highest, tile.step})
-            if (!std::isfinite(d)) fail("the metadata lack a number");
+        for (double d : {tile.geometric_error, tile.step})
+            if (!std::isfinite(d)) fail("the metadata lack a number of the level");
+        for (double d : {tile.error, tile.vertical_error, tile.lowest, tile.highest})
+            if (tile.count() > 0 && !std::isfinite(d)) fail("the metadata lack a number");
     }
     void read_metadata(const std::vector<uint8_t> &body) {
         uint32_t n = 0;

@@ -57,6 +57,7 @@ void answer_landing(worker *w, request *r) {
     cJSON *links = cJSON_AddArrayToObject(page, "links");
     add_link(links, "self", JSON, "this document", "/?f=json");
     add_link(links, "alternate", "text/html", "the viewer", "/?f=html");
+    add_link(links, "related", "text/html", "terrain on Cesium's globe", "/cesium");
     add_link(links, "service-desc", "application/vnd.oai.openapi+json;version=3.0", "the API", "/openapi.json");
     add_link(links, "conformance", JSON, "what the API conforms to", "/conformance");
     add_link(links, "data", JSON, "the terrains", "/collections");

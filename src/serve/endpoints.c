@@ -34,6 +34,7 @@ const endpoint endpoints[] = {
     {"tileset", TERRAIN "/tiles/3d-tiles/tileset.json", " ", answer_tile_document, false},
     {"content", TERRAIN "/tiles/3d-tiles/content/{z}/{x}/{y}.glb", " ", answer_tile, false},
     {"subtree", TERRAIN "/tiles/3d-tiles/subtrees/{z}/{x}/{y}.subtree", " ", answer_tile, false},
+    {"cesium", "/cesium", " terrain ", answer_cesium, false},
     {"health", "/healthz", " ", answer_health, true},
     {"metrics", "/metrics", " ", answer_metrics, true},
     {"page", "/{file}", " ", NULL, false},
@@ -134,9 +135,9 @@ static uint64_t add_text(uint64_t hash, const char *text) {
 
 bool endpoint_represent(request *r, uint64_t state, const char *type, bool packed, bool by_accept) {
     answer *a = &r->answer;
-    if (packed)
-        a->coding = CODING_IDENTITY;
-    else if (!negotiate_coding(r->accept_encoding, &a->coding)) {
+    if (packed) a->coding = CODING_IDENTITY;
+    /* zstd is quicker and smaller, unless gzip is at hand. */
+    else if (!negotiate_coding(r->accept_encoding, a->is_gzipped ? CODING_GZIP : CODING_ZSTD, &a->coding)) {
         answer_problem(r, MHD_HTTP_NOT_ACCEPTABLE,
                        "answers are zstd, gzip, or as they are: Accept-Encoding takes none");
         return false;

@@ -11,7 +11,7 @@
  *   tables.c     height, profile, verify, explain, area
  *   globe.c      tiles for globes
  *   documents.c  landing page, conformance, collections
- *   page.c       the files of web/, compiled in
+ *   page.c       the files of web/, compiled in, gzipped
  *   answer.c     bytes, problems (RFC 9457), rows as JSON
  *   negotiate.c  Accept, Accept-Encoding, If-None-Match; compression
  *   metrics.c    what /metrics tells
@@ -70,6 +70,7 @@ typedef struct answer {
     char etag[80];      /* quoted; "": none */
     const char *varies; /* header Vary, static; NULL: on nothing */
     coding coding;
+    bool is_gzipped;                     /* of gzip the body is there already, compressed */
     const char *retry;                   /* Retry-After; NULL: none */
     bool is_page;                        /* HTML: tell the browser what it may load */
     bool is_lasting;                     /* may be kept as --max-age says; else by nobody */
@@ -129,8 +130,8 @@ const char *status_title(unsigned status);
  */
 /* Which of `count` media types the client likes best, the first when it does not say; -1: none. */
 int negotiate_type(const char *accept, const char *const *types, int count);
-/* False: the client takes none of ours. */
-bool negotiate_coding(const char *accept_encoding, coding *coding);
+/* Of equal ones the one that is liked: gzip or zstd. False: the client takes none of ours. */
+bool negotiate_coding(const char *accept_encoding, coding liked, coding *coding);
 const char *coding_name(coding c);
 bool etag_matches(const char *if_none_match, const char *etag);
 /* The answer's body as its coding says; small ones are left as they are. */
@@ -243,6 +244,7 @@ void answer_explain(worker *w, request *r);
 void answer_area(worker *w, request *r);
 void answer_tile_document(worker *w, request *r);
 void answer_tile(worker *w, request *r);
+void answer_cesium(worker *w, request *r);
 void answer_health(worker *w, request *r);
 void answer_metrics(worker *w, request *r);
 

@@ -73,7 +73,7 @@ const char *coding_name(coding c) {
     return names[c];
 }
 
-bool negotiate_coding(const char *accept_encoding, coding *c) {
+bool negotiate_coding(const char *accept_encoding, coding liked, coding *c) {
     *c = CODING_IDENTITY;
     if (!accept_encoding) return true;
     int weight[3] = {-1, -1, -1}, any = -1; /* -1: not named */
@@ -86,8 +86,8 @@ bool negotiate_coding(const char *accept_encoding, coding *c) {
     for (int i = 0; i < 3; i++)
         if (weight[i] < 0) weight[i] = any;
     if (weight[CODING_IDENTITY] < 0) weight[CODING_IDENTITY] = 1; /* acceptable when nothing is said of it */
-    /* Of equal ones zstd, which is quicker and smaller. */
-    const coding packed = weight[CODING_ZSTD] >= weight[CODING_GZIP] ? CODING_ZSTD : CODING_GZIP;
+    const coding other = liked == CODING_ZSTD ? CODING_GZIP : CODING_ZSTD;
+    const coding packed = weight[liked] >= weight[other] ? liked : other;
     if (weight[packed] >= weight[CODING_IDENTITY]) *c = packed;
     return weight[*c] > 0;
 }
@@ -143,6 +143,7 @@ static char *zstd(const buffer *b, size_t *size) {
 
 void answer_compress(request *r) {
     answer *a = &r->answer;
+    if (a->coding == CODING_GZIP && a->is_gzipped) return;
     if (a->coding == CODING_IDENTITY || a->body.size < WORTHWHILE) {
         a->coding = CODING_IDENTITY;
         return;

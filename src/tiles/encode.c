@@ -131,36 +131,47 @@ static void put_water(writer *w, const tiles *t, const tile_place *place) {
     put(w, mask, size);
 }
 
-/* What the tile is off. */
-static void put_metadata(writer *w, const tile_plan *plan, const tile_place *place, const tile_mesh *mesh) {
+/* What the tile is off; and of level 0 which tiles there are below it (layer.c). */
+static int put_metadata(writer *w, tiles *t, const tile_place *place, const tile_mesh *mesh, char **error) {
+    const tile_plan *plan = plan_of(t);
     const tile_level *level = &plan->level[place->z];
     uint16_t low = TILE_UNITS, high = 0;
     for (size_t i = 0; i < mesh->cut.vertex_count; i++) {
         if (mesh->h[i] < low) low = mesh->h[i];
         if (mesh->h[i] > high) high = mesh->h[i];
     }
+    enum { OF_LEVEL = 3, MEMBERS = 7 };
     const struct {
         const char *name;
         double value;
-    } members[] = {{"geometricError", level->geometric_error},
-                   {"error", mesh->error},
-                   {"verticalError", mesh->vertical_error},
-                   {"eps", level->eps},
-                   {"heightStep", plan->step},
-                   {"minimumHeight", plan->lowest + low * plan->step},
-                   {"maximumHeight", plan->lowest + high * plan->step}};
-    char json[512], *end = json;
-    for (size_t i = 0; i < sizeof members / sizeof *members; i++) {
+    } members[MEMBERS] = {{"geometricError", level->geometric_error},
+                          {"eps", level->eps},
+                          {"heightStep", plan->step},
+                          /* of what is in it */
+                          {"error", mesh->error},
+                          {"verticalError", mesh->vertical_error},
+                          {"minimumHeight", plan->lowest + low * plan->step},
+                          {"maximumHeight", plan->lowest + high * plan->step}};
+    char json[512], *end = json, *below = NULL;
+    for (size_t i = 0; i < (mesh->cut.vertex_count > 0 ? MEMBERS : OF_LEVEL); i++) {
         char number[32];
         format_double(members[i].value, number);
         end += sprintf(end, "%s\"%s\":%s", i ? "," : "{", members[i].name, number);
     }
-    end += sprintf(end, "}");
-    const size_t size = (size_t)(end - json);
+    if (place->z == 0) {
+        const int code = layer_below(t, place->x, &below, error);
+        if (code != SQLITE_OK) return code;
+        end += sprintf(end, ",\"available\":");
+    }
+    const size_t told = (size_t)(end - json), listed = below ? strlen(below) : 0, size = told + listed + 1;
     put_number(w, METADATA, 1);
     put_number(w, size + 4, 4);
     put_number(w, size, 4);
-    put(w, json, size);
+    put(w, json, told);
+    put(w, below, listed);
+    put(w, "}", 1);
+    sqlite3_free(below);
+    return SQLITE_OK;
 }
 
 int encode_tile(tiles *t, const tile_place *place, const tile_mesh *mesh, tile_bytes *out, char **error) {
@@ -182,9 +193,9 @@ int encode_tile(tiles *t, const tile_place *place, const tile_mesh *mesh, tile_b
     put_differences(&w, mesh->h, cut->vertex_count);
     put_triangles(&w, cut, index);
     put_sides(&w, mesh, index);
-    code = put_normals(&w, t, mesh, &globe, error);
+    if (cut->vertex_count > 0) code = put_normals(&w, t, mesh, &globe, error);
     if (plan_of(t)->has_sea) put_water(&w, t, place);
-    put_metadata(&w, plan_of(t), place, mesh);
+    if (code == SQLITE_OK) code = put_metadata(&w, t, place, mesh, error);
     globe_free(&globe);
     if (code == SQLITE_OK && w.no_memory) code = SQLITE_NOMEM;
     if (code == SQLITE_OK)

@@ -68,7 +68,8 @@ static void find_sphere(const double *xyz, size_t count, tile_globe *globe) {
             if (x < low[k]) low[k] = x;
             if (x > high[k]) high[k] = x;
         }
-    for (int k = 0; k < 3; k++) globe->centre[k] = (low[k] + high[k]) / 2;
+    /* Of a tile that is empty a point of the equator: nobody looks there for anything. */
+    for (int k = 0; k < 3; k++) globe->centre[k] = count > 0 ? (low[k] + high[k]) / 2 : k == 0 ? A : 0;
     for (size_t i = 0; i < count; i++) {
         const double *p = xyz + 3 * i;
         const double from[3] = {p[0] - globe->centre[0], p[1] - globe->centre[1], p[2] - globe->centre[2]};
@@ -81,7 +82,7 @@ static void find_sphere(const double *xyz, size_t count, tile_globe *globe) {
 static void find_horizon(const double *xyz, size_t count, tile_globe *globe) {
     double direction[3] = {globe->centre[0] / A, globe->centre[1] / A, globe->centre[2] / B}, most = 0;
     const double length = sqrt(dot(direction, direction));
-    bool exists = length > 0;
+    bool exists = length > 0 && count > 0;
     for (int k = 0; k < 3; k++) direction[k] = exists ? direction[k] / length : k == 0;
     for (size_t i = 0; i < count && exists; i++) {
         const double p[3] = {xyz[3 * i] / A, xyz[3 * i + 1] / A, xyz[3 * i + 2] / B};

@@ -35,6 +35,7 @@ struct tiles {
     const tile_kind *kind;        /* between begin and end */
     const store_terrain *terrain; /* likewise */
     void *plan;                   /* likewise: the kind's own */
+    int last;                     /* likewise: of tiles_tell */
     kept_plan kept[KEPT_PLANS];
     int next; /* place of the plan that goes next */
 };
@@ -174,6 +175,9 @@ int water_read(tiles *t, tile_plan *plan, char **error);
 size_t water_mask(const tiles *t, const tile_place *place, uint8_t mask[WATER_SIDE * WATER_SIDE]);
 
 int layer_available(tiles *t, int z, const tile_range **ranges, size_t *count, char **error);
+/* The tiles below one of level 0, as JSON: a list of ranges for each level from 1 on, to be released with
+ * sqlite3_free. */
+int layer_below(tiles *t, int32_t x, char **text, char **error);
 int layer_make(tiles *t, int first, int last, tile_bytes *out, char **error);
 
 int encode_tile(tiles *t, const tile_place *place, const tile_mesh *mesh, tile_bytes *out, char **error);

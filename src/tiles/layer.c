@@ -5,6 +5,12 @@
  * blocks that answer have no void, or nothing else, that holds for all of their tiles (store_covers). Other squares
  * are quartered, and a tile that is left is asked by a query that stops at the first block with a triangle. So it
  * takes as many queries as there are tiles near the outlines of voids.
+ *
+ * The two tiles of level 0 are always there, without a triangle where they have no terrain: Cesium begins with
+ * both, and draws nothing below one that it does not get. Cesium also wants to be told which tiles there are by
+ * tiles that have the metadata extension, and reads none of them unless layer.json has "metadataAvailability": that
+ * after so many levels a tile tells of those below it. Here that is one more than there are, so that it is the
+ * tiles of level 0 that do, of all levels (encode.c). Clients that go by "available" find the same there.
  */
 #include "internal.h"
 
@@ -136,7 +142,7 @@ int layer_available(tiles *t, int z, const tile_range **ranges, size_t *count, c
     if (z < 0 || z > plan->finest) return SQLITE_OK;
     int code = SQLITE_OK;
     if (!plan->ranges[z]) {
-        const int n = plan_ranges(t, z, all);
+        const int n = z > 0 ? plan_ranges(t, z, all) : 0;
         list.items = sqlite3_malloc(MOST_TURNS * sizeof *list.items);
         list.capacity = list.items ? MOST_TURNS : 0;
         if (!list.items) return SQLITE_NOMEM;
@@ -144,6 +150,7 @@ int layer_available(tiles *t, int z, const tile_range **ranges, size_t *count, c
         const int32_t y1 = n ? all[0].y1 : -1; /* all ranges have the same rows */
         for (int32_t y = n ? all[0].y0 : 0; y <= y1 && t->terrain->voids && code == SQLITE_OK; y += SQUARE)
             code = add_band(t, z, all, n, y, y1 - y < SQUARE ? y1 : y + SQUARE - 1, &list, error);
+        if (z == 0 && code == SQLITE_OK) code = add_range(&list, (tile_range){0, 1, 0, 0});
         if (code != SQLITE_OK) {
             sqlite3_free(list.items);
             return code;
@@ -158,6 +165,19 @@ int layer_available(tiles *t, int z, const tile_range **ranges, size_t *count, c
 
 /* ---------------------------------------------------------------------------------------------- layer.json -- */
 
+/* The ranges as far as they are in columns x0..x1. */
+static void add_ranges(const tile_range *ranges, size_t count, int32_t x0, int32_t x1, cJSON *list) {
+    for (size_t i = 0; i < count; i++) {
+        if (ranges[i].x1 < x0 || ranges[i].x0 > x1) continue;
+        cJSON *range = cJSON_CreateObject();
+        cJSON_AddNumberToObject(range, "startX", ranges[i].x0 > x0 ? ranges[i].x0 : x0);
+        cJSON_AddNumberToObject(range, "startY", ranges[i].y0);
+        cJSON_AddNumberToObject(range, "endX", ranges[i].x1 < x1 ? ranges[i].x1 : x1);
+        cJSON_AddNumberToObject(range, "endY", ranges[i].y1);
+        cJSON_AddItemToArray(list, range);
+    }
+}
+
 static int add_available(tiles *t, int first, int last, cJSON *layer, char **error) {
     cJSON *levels = cJSON_AddArrayToObject(layer, "available");
     for (int z = 0; z <= last; z++) {
@@ -166,17 +186,29 @@ static int add_available(tiles *t, int first, int last, cJSON *layer, char **err
         const int code = z < first ? SQLITE_OK : layer_available(t, z, &ranges, &count, error);
         if (code != SQLITE_OK) return code;
         cJSON *list = cJSON_CreateArray();
-        for (size_t i = 0; i < count; i++) {
-            cJSON *range = cJSON_CreateObject();
-            cJSON_AddNumberToObject(range, "startX", ranges[i].x0);
-            cJSON_AddNumberToObject(range, "startY", ranges[i].y0);
-            cJSON_AddNumberToObject(range, "endX", ranges[i].x1);
-            cJSON_AddNumberToObject(range, "endY", ranges[i].y1);
-            cJSON_AddItemToArray(list, range);
-        }
+        add_ranges(ranges, count, 0, (2 << z) - 1, list);
         cJSON_AddItemToArray(levels, list);
     }
     return SQLITE_OK;
+}
+
+int layer_below(tiles *t, int32_t x, char **text, char **error) {
+    const int last = t->last < plan_of(t)->finest ? t->last : plan_of(t)->finest;
+    cJSON *levels = cJSON_CreateArray();
+    int code = SQLITE_OK;
+    for (int z = 1; z <= last && code == SQLITE_OK; z++) {
+        const tile_range *ranges = NULL;
+        size_t count = 0;
+        code = layer_available(t, z, &ranges, &count, error);
+        cJSON *list = cJSON_CreateArray();
+        add_ranges(ranges, count, x << z, ((x + 1) << z) - 1, list);
+        cJSON_AddItemToArray(levels, list);
+    }
+    char *printed = code == SQLITE_OK ? cJSON_PrintUnformatted(levels) : NULL;
+    *text = printed ? sqlite3_mprintf("%s", printed) : NULL;
+    cJSON_free(printed);
+    cJSON_Delete(levels);
+    return code != SQLITE_OK ? code : *text ? SQLITE_OK : SQLITE_NOMEM;
 }
 
 /* Longitudes of -180..180. Across the antimeridian it is all of them: clients know no other way to say it. */
@@ -214,6 +246,7 @@ static cJSON *describe(const tiles *t, int first, int last) {
     cJSON_AddItemToObject(layer, "extensions", cJSON_CreateStringArray(extensions, plan_of(t)->has_sea ? 3 : 2));
     cJSON_AddNumberToObject(layer, "minzoom", first);
     cJSON_AddNumberToObject(layer, "maxzoom", last);
+    if (first == 0) cJSON_AddNumberToObject(layer, "metadataAvailability", last + 1);
     add_bounds(t->terrain, layer);
     add_attribution(t->terrain, layer);
     /* For people: what clients take each level to be off, and the part that the mesh has of it. */

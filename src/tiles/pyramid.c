@@ -145,6 +145,7 @@ static int write_tile(pyramid *p, tiles *t, const piece *row, int32_t x, char **
 static int write_pieces(pyramid *p, tiles *t, char **error) {
     int code = tiles_begin(t, p->job->kind, p->job->terrain, error);
     if (code != SQLITE_OK) return code;
+    tiles_tell(t, p->last);
     code = check_state(p, t, error);
     for (size_t n; code == SQLITE_OK && (n = p->next++) < p->count;)
         for (int32_t x = p->pieces[n].x0; x <= p->pieces[n].x1 && code == SQLITE_OK && !p->stop; x++) {

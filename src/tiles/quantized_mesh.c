@@ -14,11 +14,12 @@ static int available(tiles *t, int series, int z, const tile_range **ranges, siz
 
 static int make(tiles *t, int series, int z, int32_t x, int32_t y, tile_bytes *out, char **error) {
     tile_place place;
-    tile_mesh mesh;
+    tile_mesh mesh = {0};
     (void)series;
-    if (!plan_place(t, z, x, y, &place) || place.turns == 0) return SQLITE_OK;
-    int code = mesh_make(t, &place, &mesh, error);
-    if (code == SQLITE_OK && mesh.cut.triangle_count > 0) code = encode_tile(t, &place, &mesh, out, error);
+    if (!plan_place(t, z, x, y, &place)) return SQLITE_OK;
+    int code = place.turns > 0 ? mesh_make(t, &place, &mesh, error) : SQLITE_OK;
+    if (code == SQLITE_OK && (mesh.cut.triangle_count > 0 || z == 0))
+        code = encode_tile(t, &place, &mesh, out, error);
     mesh_free(&mesh);
     return code;
 }

@@ -139,6 +139,7 @@ int tiles_begin(tiles *t, const tile_kind *kind, const char *terrain, char **err
     int code = store_begin(t->store, error);
     if (code != SQLITE_OK) return code;
     t->kind = kind;
+    t->last = TILES_LEVELS;
     code = store_find(t->store, terrain, &t->terrain, error);
     if (code == SQLITE_OK) code = find_plan(t, error);
     if (code != SQLITE_OK) tiles_end(t);
@@ -150,6 +151,10 @@ void tiles_end(tiles *t) {
     t->terrain = NULL;
     t->plan = NULL;
     store_end(t->store);
+}
+
+void tiles_tell(tiles *t, int last) {
+    t->last = last;
 }
 
 int tiles_finest(const tiles *t) {

@@ -62,6 +62,8 @@ int tiles_begin(tiles *t, const tile_kind *kind, const char *terrain, char **err
 void tiles_end(tiles *t);
 /* The last level, which has the resolution of the raster. */
 int tiles_finest(const tiles *t);
+/* Until tiles_end, tiles that tell which others there are leave out levels beyond `last`. */
+void tiles_tell(tiles *t, int last);
 /* The tiles of a level: those that have something in them, each in one range, by y0, then by x0. Good until the
  * next tiles_begin. */
 int tiles_available(tiles *t, int series, int z, const tile_range **ranges, size_t *count, char **error);

@@ -7,6 +7,7 @@
 set -eu
 out=$1 packages=$2
 here=$(dirname "$0")
+files="$out/index.html $out/viewer.css $out/viewer.js $out/decoder.js"
 mkdir -p "$out" "$packages"
 cp "$here/index.html" "$here/viewer.css" "$out/"
 
@@ -15,7 +16,7 @@ without() {
     for script in viewer decoder; do
         cp "$here/without.js" "$out/$script.js"
     done
-    touch -d 2000-01-01 "$out"/*
+    touch -d 2000-01-01 $files
     exit 0
 }
 
@@ -30,4 +31,4 @@ fi
 NODE_PATH=$packages/node_modules node "$packages/node_modules/esbuild/bin/esbuild" viewer="$here/main.js" decoder="$here/decoder.js" \
     --bundle --minify --format=iife --target=es2020 --charset=utf8 --legal-comments=eof --log-level=warning --outdir="$out"
 # To make they are one: as old as each other.
-touch -r "$out/viewer.js" "$out"/*
+touch -r "$out/viewer.js" $files

@@ -1,7 +1,7 @@
 // legend.js - what the colours mean.
 
 import {metres, plain} from './format.js';
-import {ERROR, LAND, SEA, rampCss} from './palette.js';
+import {ERROR, LAND, SEA, rampCss} from './ramps.js';
 import {clamp} from './scene.js';
 
 const legend = document.getElementById('legend');

@@ -5,7 +5,8 @@
 // eye and a ridge 100 km away are told apart with the same care, and no plane near or far needs choosing.
 
 import {DoubleSide, GLSL3, ShaderMaterial, Vector2} from 'three';
-import {ERROR, LAND, SEA, rampTexture} from './palette.js';
+import {rampTexture} from './palette.js';
+import {ERROR, LAND, SEA} from './ramps.js';
 
 export const COLOURINGS = ['relief', 'error', 'plain'];
 

@@ -51,6 +51,10 @@ export async function askTerrains() {
         ({id, bbox: extent.spatial.bbox[0], terrain: {min_z: null, max_z: null, ...terrain}}));
 }
 
+/** layer.json of a terrain's tiles for globes. */
+export const askLayer = terrain => askJson(`${tilesPath(terrain)}/layer.json`);
+export const tilesPath = terrain => `collections/${encodeURIComponent(terrain)}/tiles/quantized-mesh`;
+
 /**
  * The path of the mesh that a camera needs (camera.js), with the rest of the terrain as coarse as may be, so that one that
  * turns sees no hole; or of a mesh that is nowhere further than eps from the data.

@@ -304,6 +304,8 @@ export class Viewer {
         this.layer.show(stage, performance.now());
         this.figures.showStage(stage, this.terrain);
         element('bare').href = stage.wish.path;
+        element('globe').href = `cesium?terrain=${encodeURIComponent(this.terrain.id)}`;
+        element('globe').hidden = !this.terrain.terrain.lonlat;
         this.paint();
         if (this.isMeshMissing) this.fail('');
         this.isMeshMissing = false;

@@ -54,7 +54,7 @@ export async function openPage(browser, service, {width, height, touch = false, 
     if (record) await page.addInitScript(recordFrames, {findGaps: findGaps.toString(), vanishingPoint: vanishingPoint.toString(), background: BACKGROUND, slow});
     await prepare(page);
     await page.goto(service.url + path);
-    await page.evaluate(() => window.rqtViewer.ready);
+    await page.evaluate(() => (window.rqtViewer || window.rqtCesium).ready);
     return Object.assign(new View(), {page, context, problems, asked, told, touch});
 }
 

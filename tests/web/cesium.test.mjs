@@ -1,0 +1,307 @@
+// cesium.test.mjs - Cesium itself as the judge of our tiles: what its sampleTerrain reads is the terrain, at every level; and
+// the page /cesium, which flies over them and asks nobody else for anything.
+//
+// What is read is put beside rqt_height at full resolution. What a tile may be off stands in its metadata extension, which
+// another decoder (HERE's) reads.
+import assert from 'node:assert/strict';
+import {execFileSync, spawnSync} from 'node:child_process';
+import {mkdirSync, mkdtempSync, readFileSync, rmSync, symlinkSync} from 'node:fs';
+import {join} from 'node:path';
+import {after, before, test} from 'node:test';
+import {PATIENCE, PHONE, SMALL, keepingShots, launch, openPage} from './browser.mjs';
+import {Dice} from './oracle.mjs';
+import {BUILD, ROOT, requirePackage} from './packages.mjs';
+import {differingPixels} from './picture.mjs';
+import {Service, sql} from './serve.mjs';
+
+const {default: decode} = requirePackage('@here/quantized-mesh-decoder');
+const RQT = process.env.RQT || join(BUILD, 'rqt');
+const PLACES = 400; // in each terrain, a few of which are too near to its rim or to voids
+const WINDOWS = 8, WINDOW = 100; // in which they are; samples a side
+const data = name => join(ROOT, 'tests', 'data', name);
+
+/** x0, y0: the first sample; step in degrees. */
+const TERRAINS = {
+    white: {sources: [join(ROOT, 'examples', 'N44W072.hgt.zip')], x0: -72, y0: 45, step: 1 / 1200, columns: 1201, rows: 1201},
+    // Two sheets, one terrain; voids.
+    pyrenees: {sources: [data('N42E001.hgt.zip'), data('N41E001.hgt.zip')], x0: 1, y0: 43, step: 1 / 1200, columns: 1201, rows: 2401, hasVoids: true},
+    africa: {sources: [data('eastafrica.tif')], x0: 25, y0: 6.983333, step: 0.05, columns: 220, rows: 380},
+    // Both tiles of level 0, both poles.
+    world: {sources: [data('etopo1_1deg.tif')], x0: -180, y0: 90, step: 1, columns: 361, rows: 181},
+};
+const METRES = {sources: [data('glarus_alpine_25m_161.tif')]};
+
+const home = mkdtempSync(join(ROOT, 'build', 'web-tests', 'cesium-'));
+const database = join(home, 'terrains.gpkg');
+let service, browser;
+const views = [];
+const dice = new Dice(20261126);
+console.log(`RQT_SEED=${dice.seed}`);
+
+before(async () => {
+    for (const [name, {sources}] of Object.entries({...TERRAINS, metres: METRES}))
+        execFileSync(RQT, ['import', '--name', name, ...sources, database], {stdio: 'pipe'});
+    [service, browser] = await Promise.all([Service.start({databases: [database]}), launch()]);
+});
+after(async () => {
+    await browser.close();
+    const ended = await service.stop();
+    rmSync(home, {recursive: true});
+    assert.deepEqual(ended, {status: 0, said: ''});
+});
+
+async function open(path, options = SMALL) {
+    const view = await openPage(browser, service, {...options, path: `cesium${path}`});
+    views.splice(0, Infinity, view);
+    // Software stands in for the graphics card.
+    await view.page.evaluate(() => { if (window.rqtCesium.globe) window.rqtCesium.globe.scene.msaaSamples = 1; });
+    return view;
+}
+
+/** Until every tile that the picture needs is in it. */
+async function settled(view) {
+    const is = await view.page.evaluate(patience => Promise.race([
+        window.rqtCesium.settled().then(() => true), new Promise(resolve => setTimeout(resolve, patience, false)),
+    ]), PATIENCE);
+    assert.ok(is, `it settles: ${JSON.stringify(await state(view))}`);
+}
+const state = view => view.page.evaluate(() => window.rqtCesium.state());
+const sentence = view => view.page.evaluate(() => document.querySelector('#excuse').innerText);
+
+/** Shares of the picture that change when the terrain is not drawn. */
+async function shareOfTerrain(view) {
+    const show = is => view.page.evaluate(async shown => {
+        const {globe} = window.rqtCesium;
+        globe.globe.show = shown;
+        for (let i = 0; i < 3; i++) {
+            globe.scene.requestRender();
+            await new Promise(resolve => requestAnimationFrame(resolve));
+        }
+    }, is);
+    const picture = await view.picture();
+    await show(false);
+    const share = differingPixels(picture, await view.picture()) / picture.width / picture.height;
+    await show(true);
+    return share;
+}
+
+// ------------------------------------------------------------------------------------------------------------- heights
+
+/**
+ * Places within a terrain, in a few windows so that they share tiles: samples, places between, and places on the sides of
+ * tiles of its last level.
+ */
+function placesOf({x0, y0, step, columns, rows}, finest) {
+    const side = 180 / 2 ** finest, places = [];
+    let window = [];
+    for (let i = 0; i < PLACES; i++) {
+        if (i % (PLACES / WINDOWS) === 0) window = [columns, rows].map(count => 1 + dice.below(count - WINDOW - 2));
+        const [column, row] = window.map(first => i % 2 ? first + WINDOW * dice.below(2 ** 30) / 2 ** 30 : first + dice.below(WINDOW));
+        let x = x0 + step * column, y = y0 - step * row;
+        if (i % 8 === 1) x = Math.round((x + 180) / side) * side - 180;
+        if (i % 8 === 3) y = Math.round((y + 90) / side) * side - 90;
+        if (x > x0 + step && x < x0 + (columns - 2) * step && y < y0 - step && y > y0 - (rows - 2) * step) places.push([x, y]);
+    }
+    return places;
+}
+
+/** Heights at full resolution; null where there is none. */
+async function heightsAt(terrain, places) {
+    const heights = [];
+    for (let i = 0; i < places.length; i += 1000) {
+        const rows = await sql("SELECT rqt_height(json_extract(value, '$[0]'), json_extract(value, '$[1]'), 0, :terrain) AS z FROM json_each(:places)",
+            {terrain, places: JSON.stringify(places.slice(i, i + 1000))}, database);
+        heights.push(...rows.map(({z}) => z));
+    }
+    return heights;
+}
+
+const stated = new Map();
+/** What a tile says that it may be off, above and below; 0: there is none. */
+async function statedBy(terrain, z, x, y) {
+    const path = `collections/${terrain}/tiles/quantized-mesh/${z}/${x}/${y}.terrain`;
+    if (!stated.has(path)) {
+        const answer = await fetch(service.url + path), bytes = await answer.arrayBuffer();
+        stated.set(path, answer.ok ? decode(bytes).extensions.metadata.verticalError || 0 : 0);
+    }
+    return stated.get(path);
+}
+
+/** The tiles of a level that a place is in: of a side, both. */
+function tilesAt([longitude, latitude], z) {
+    const side = 180 / 2 ** z, near = 1e-9, tiles = [];
+    for (const x of new Set([-near, near].map(by => Math.floor((longitude + by + 180) / side))))
+        for (const y of new Set([-near, near].map(by => Math.floor((latitude + by + 90) / side)))) tiles.push([x, y]);
+    return tiles;
+}
+
+/** Fails where what Cesium has read is further from the terrain than the tile says; the share of that which the worst takes. */
+async function judge(terrain, z, places, heights, read, mayMiss = false) {
+    let worst = 0, above = 0, missed = 0;
+    for (const [i, place] of places.entries()) {
+        const allowed = Math.max(...await Promise.all(tilesAt(place, z).map(([x, y]) => statedBy(terrain, z, x, y))));
+        assert.ok(allowed > 0, `${terrain}: a tile of level ${z} at ${place}`);
+        if (read[i] === null && mayMiss) {
+            missed++;
+            continue;
+        }
+        assert.notEqual(read[i], null, `${terrain}: level ${z} has a height at ${place}, where it is ${heights[i]}`);
+        const off = Math.abs(read[i] - heights[i]);
+        assert.ok(off <= allowed + 1e-6, `${terrain}: level ${z} has ${read[i]} at ${place}, where it is ${heights[i]}, and states ${allowed}`);
+        worst = Math.max(worst, off / allowed);
+        above += read[i] > heights[i];
+    }
+    assert.ok(missed < places.length / 4, `${terrain}: level ${z} misses ${missed} of ${places.length}`);
+    return {worst, above};
+}
+
+for (const [name, terrain] of Object.entries(TERRAINS))
+    test(`${name}: sampleTerrainMostDetailed and sampleTerrain of every level are within what the tiles state`, keepingShots(`cesium-${name}`, () => views, async () => {
+        const view = await open(`?terrain=${name}`), {errors} = await state(view), finest = errors.length - 1;
+        // Where all around are heights too: the outlines of voids move as vertices do.
+        const all = placesOf(terrain, finest), around = terrain.step;
+        const grid = await heightsAt(name, all.flatMap(([x, y]) => [-1, 0, 1].flatMap(i => [-1, 0, 1].map(j => [x + i * around, y + j * around]))));
+        const places = [], heights = [];
+        all.forEach((place, i) => {
+            if (grid.slice(9 * i, 9 * i + 9).includes(null)) return;
+            places.push(place);
+            heights.push(grid[9 * i + 4]);
+        });
+        assert.ok(places.length >= 300, `${places.length} places`);
+        const sample = level => view.page.evaluate(([p, z]) => window.rqtCesium.sample(p, z ?? undefined), [places, level]);
+        const {worst} = await judge(name, finest, places, heights, await sample(null));
+        assert.ok(worst > 0.01, `heights are rounded: ${worst}`);
+        for (let z = 0; z <= finest; z++) {
+            // The outlines of voids may be off by as much as heights: of a coarse level they hide more.
+            const {above} = await judge(name, z, places, heights, await sample(z), terrain.hasVoids && z < finest);
+            assert.ok(above > 0, `level ${z}`);
+        }
+        // Where there is no terrain, there is no height.
+        if (name !== 'world') assert.deepEqual(await view.page.evaluate(() => window.rqtCesium.sample([[100, 10], [-100, -40]])), [null, null]);
+        assert.deepEqual(view.problems, []);
+        await view.close();
+    }));
+
+// ---------------------------------------------------------------------------------------------------------------- page
+
+for (const [name, options] of [['white', SMALL], ['pyrenees', PHONE], ['world', SMALL]])
+    test(`${name}: a picture of it, its figures, and no complaint`, keepingShots(`cesium-${name}`, () => views, async () => {
+        const view = await open(`?terrain=${name}`, options);
+        await settled(view);
+        await view.shot(`cesium-${name}`);
+        const {terrain, levels, errors} = await state(view);
+        assert.equal(terrain, name);
+        assert.ok(levels.coarsest > 0 && levels.finest < errors.length, JSON.stringify(levels));
+        const promise = await view.page.textContent('#promise');
+        assert.match(promise, /^Levels? \d+( to \d+)?: proved to be off by no more than [\d.\u202f]+\u00a0k?m/);
+        assert.match(await view.page.textContent('#credits'), /CesiumJS/);
+        const share = await shareOfTerrain(view);
+        assert.ok(share > 0.25, `terrain has ${share} of the picture`);
+        assert.deepEqual(view.problems, []);
+        // Nothing but its own files, and tiles that there are.
+        const strange = view.asked.filter(({pathname}) => !/^\/(cesium|collections|[\w-]+\.(js|css))/.test(pathname));
+        assert.deepEqual(strange.map(({href}) => href).filter(href => !/^(blob|data):/.test(href)), []);
+        await view.close();
+    }));
+
+test('neighbours of one level have no crack between them, without skirts', keepingShots('cesium-cracks', () => views, async () => {
+    const view = await open('?terrain=white');
+    await view.page.evaluate(() => {
+        const {globe: {scene, globe}} = window.rqtCesium;
+        Object.assign(globe, {showSkirts: false, showGroundAtmosphere: false});
+        scene.primitives.show = scene.skyAtmosphere.show = scene.fog.enabled = false;
+        Object.assign(scene.backgroundColor, {red: 1, green: 0, blue: 1});
+    });
+    let seen = 0;
+    for (const height of [30000, 36000, 42000]) {
+        await view.page.evaluate(h => window.rqtCesium.setCamera({longitude: -71.45, latitude: 44.5, height: h, heading: 20, pitch: -90}), height);
+        await settled(view);
+        const {levels: {finest, coarsest}} = await state(view);
+        if (finest !== coarsest) continue;
+        const tiles = await view.page.evaluate(() => window.rqtCesium.globe.globe._surface._tilesToRender.length);
+        const {rgba} = await view.picture();
+        let gaps = 0;
+        for (let i = 0; i < rgba.length; i += 4) gaps += Math.min(rgba[i], rgba[i + 2]) - rgba[i + 1] > 60;
+        assert.equal(gaps, 0, `from ${height} m, level ${finest}`);
+        seen += tiles > 3;
+        await view.shot('cesium-cracks');
+    }
+    assert.ok(seen > 0, 'a picture of several tiles, all of one level');
+    // And the background would be seen.
+    await view.page.evaluate(() => window.rqtCesium.setCamera({longitude: -71, latitude: 44.5, height: 40000, heading: 0, pitch: -90}));
+    await settled(view);
+    const {rgba} = await view.picture();
+    assert.ok(rgba[4 * 470 + 1] < 30 && rgba[4 * 470] > 225, 'east of the terrain');
+    assert.deepEqual(view.problems, []);
+    await view.close();
+}));
+
+test('it flies, and nothing that it asks for on its way is missing', keepingShots('cesium-flight', () => views, async () => {
+    const view = await open('?terrain=white');
+    await settled(view);
+    const {camera: before} = await state(view);
+    await view.page.locator('#fly').click();
+    await view.until(() => window.rqtCesium.state().camera.heading, heading => Math.abs(heading - before.heading) > 2);
+    assert.equal(await view.page.getAttribute('#fly', 'aria-pressed'), 'true');
+    await view.page.locator('#picture').focus();
+    await view.page.keyboard.press('Space');
+    assert.equal((await state(view)).fly, false);
+    for (const share of [0.2, 0.7]) {
+        await view.page.evaluate(at => window.rqtCesium.seek(at), share);
+        await settled(view);
+        const {camera, levels} = await state(view), [ground] = await view.page.evaluate(({longitude, latitude}) => window.rqtCesium.sample([[longitude, latitude]]), camera);
+        assert.ok(camera.height > ground + 500, `${camera.height} m over ${ground} m`);
+        assert.ok(levels.finest > 8);
+        assert.ok(await shareOfTerrain(view) > 0.4);
+    }
+    assert.deepEqual(view.problems, []);
+    await view.close();
+}));
+
+test('keys and the address: a view is loaded again as it was', keepingShots('cesium-keys', () => views, async () => {
+    const view = await open('?terrain=white');
+    await view.page.locator('#picture').focus();
+    const from = (await state(view)).camera;
+    for (const key of ['c', 'm', ']', ']', 'ArrowLeft', 'ArrowUp', '+']) await view.page.keyboard.press(key);
+    const {contours, wires, exaggeration, camera} = await state(view);
+    assert.deepEqual([contours, wires, exaggeration], [true, true, 2]);
+    assert.ok(Math.abs(camera.heading - from.heading) > 1 && camera.latitude !== from.latitude);
+    await settled(view);
+    await view.shot('cesium-wires');
+    const address = await view.until(() => location.search + location.hash, text => text.includes('wires'));
+    const again = await open(address);
+    const found = await state(again);
+    assert.deepEqual([found.contours, found.wires, found.exaggeration, found.fly], [true, true, 2, false]);
+    for (const key of ['longitude', 'latitude', 'heading', 'pitch']) assert.ok(Math.abs(found.camera[key] - camera[key]) < 0.02, `${key}: ${found.camera[key]}, ${camera[key]}`);
+    // Another terrain is looked at from its own place.
+    await Promise.all([again.page.waitForURL(/terrain=world/), again.page.selectOption('#terrain', 'world')]);
+    await again.until(async () => window.rqtCesium && await window.rqtCesium.ready && window.rqtCesium.state(), seen => seen.terrain === 'world' && seen.camera.height > 1e5 && !seen.wires);
+    for (const page of [view, again]) {
+        assert.deepEqual(page.problems, []);
+        await page.close();
+    }
+}));
+
+test('where there is nothing to see, a sentence says why', keepingShots('cesium-nothing', () => views, async () => {
+    const none = await open('?terrain=nowhere');
+    assert.match(await sentence(none), /There is no terrain nowhere/);
+    assert.deepEqual(none.problems, []);
+    await none.close();
+    const flat = await open('?terrain=metres');
+    assert.match(await sentence(flat), /terrain metres has no tiles: they are of terrains in longitude and latitude/i);
+    await flat.shot('cesium-nothing');
+    await flat.close();
+}));
+
+test('without npm there are files that say so, for both pages', () => {
+    const tools = join(home, 'tools'), out = join(home, 'out');
+    mkdirSync(tools);
+    for (const tool of ['dirname', 'mkdir', 'cp', 'touch', 'echo', 'cat', 'sh'])
+        symlinkSync(execFileSync('sh', ['-c', `command -v ${tool} | grep / || echo /bin/${tool}`], {encoding: 'utf8'}).trim(), join(tools, tool));
+    for (const [script, ...workers] of [['src/web/bundle.sh'], ['src/web/cesium/bundle.sh', 'transferTypedArrayTest']]) {
+        const {status, stderr} = spawnSync('/bin/sh', [join(ROOT, script), out, join(home, 'packages'), ...workers], {encoding: 'utf8', env: {PATH: tools}});
+        assert.equal(status, 0, stderr);
+        assert.match(stderr, /node or npm is missing/);
+    }
+    for (const name of ['viewer.js', 'cesium.js', 'transferTypedArrayTest.js']) assert.match(readFileSync(join(out, name), 'utf8'), /npm registry was missing/);
+});
