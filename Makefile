@@ -35,7 +35,7 @@ GENERATED = $(BUILD)/generated/schema_sql.h
 
 LIBS_CORE = -lzstd -lm
 LIBS_EXT = -lGeographicLib -lgeos_c -lproj -lcjson $(LIBS_CORE)
-LIBS_CLI = $(LIBS_EXT) -lsqlite3 $(shell gdal-config --libs 2>/dev/null) $(shell pkg-config --libs cairo libpng 2>/dev/null) -lmicrohttpd -lz -lpthread -lstdc++
+LIBS_CLI = $(LIBS_EXT) -lsqlite3 $(shell gdal-config --libs 2>/dev/null) $(shell pkg-config --libs cairo libpng 2>/dev/null) -lmicrohttpd -ldeflate -lz -lpthread -lstdc++
 GDAL_CFLAGS = $(shell gdal-config --cflags 2>/dev/null)
 CAIRO_CFLAGS = $(shell pkg-config --cflags cairo libpng 2>/dev/null)
 

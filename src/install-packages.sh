@@ -8,8 +8,8 @@ set -eu
 packages_for() {
     case $1 in
     build) echo gcc g++ libc6-dev make pkg-config sqlite3 libsqlite3-dev libzstd-dev libgdal-dev libgeographiclib-dev \
-        libgeos-dev libproj-dev proj-data libcjson-dev libcairo2-dev libpng-dev fonts-dejavu-core gnuplot-nox libmicrohttpd-dev zlib1g-dev ;;
-    test) echo libcmocka-dev libgmp-dev gdal-bin libsqlite3-mod-spatialite python3 unzip binutils git ;;
+        libgeos-dev libproj-dev proj-data libcjson-dev libcairo2-dev libpng-dev fonts-dejavu-core gnuplot-nox libmicrohttpd-dev libdeflate-dev zlib1g-dev ;;
+    test) echo libcmocka-dev libgmp-dev gdal-bin libsqlite3-mod-spatialite python3 python3-gdal python3-numpy unzip binutils git ;;
     format) echo clang-format ;;
     qgis) echo python3-qgis ;;
     fuzz) echo clang-14 libclang-rt-14-dev ;;

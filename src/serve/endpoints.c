@@ -35,6 +35,8 @@ const endpoint endpoints[] = {
     {"content", TERRAIN "/tiles/3d-tiles/content/{z}/{x}/{y}.glb", " ", answer_tile, false},
     {"subtree", TERRAIN "/tiles/3d-tiles/subtrees/{z}/{x}/{y}.subtree", " ", answer_tile, false},
     {"cesium", "/cesium", " terrain ", answer_cesium, false},
+    {"terrarium", TERRAIN "/tiles/terrarium/tile.json", " ", answer_tile_document, false},
+    {"terrarium_tile", TERRAIN "/tiles/terrarium/{z}/{x}/{y}.png", " ", answer_tile, false},
     {"health", "/healthz", " ", answer_health, true},
     {"metrics", "/metrics", " ", answer_metrics, true},
     {"page", "/{file}", " ", NULL, false},

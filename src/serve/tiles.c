@@ -7,9 +7,11 @@
  */
 #include "internal.h"
 
+#include <ctype.h>
 #include <stdlib.h>
 #include <string.h>
 
+enum { MOST_HEADER = 256 };
 enum { KIND = 3, TILE_SEGMENTS = 7 }; /* a path with a folder has one more */
 
 /* What the room tiles was asked for, as the answer; code is its own. */
@@ -38,9 +40,44 @@ static int series_of(const request *r, const tile_kind *kind) {
     return 0;
 }
 
+/* The first of a list that a header holds, if it is made of nothing but letters, digits and `others`. "" if not. */
+static void read_header(const request *r, const char *name, const char *others, char value[MOST_HEADER]) {
+    const char *given = MHD_lookup_connection_value(r->connection, MHD_HEADER_KIND, name);
+    const size_t n = given ? strcspn(given, ", ") : 0;
+    value[0] = '\0';
+    if (n >= MOST_HEADER) return;
+    for (size_t i = 0; i < n; i++)
+        if (!isalnum((unsigned char)given[i]) && !strchr(others, given[i])) return;
+    memcpy(value, n ? given : "", n);
+    value[n] = '\0';
+}
+
+/* What the client has asked for, without the document's name: "https://example.org/terrain/collections/.../". There
+ * are clients that need whole addresses. Servers before us say what they were asked for in X-Forwarded-Proto, -Host
+ * and -Prefix. "", which stands for the document's own folder, where nobody says. */
+static char *find_root(const request *r) {
+    char host[MOST_HEADER], proto[MOST_HEADER], prefix[MOST_HEADER];
+    read_header(r, "X-Forwarded-Host", "-._:[]", host);
+    if (!host[0]) read_header(r, MHD_HTTP_HEADER_HOST, "-._:[]", host);
+    read_header(r, "X-Forwarded-Proto", "", proto);
+    read_header(r, "X-Forwarded-Prefix", "-._~/", prefix);
+    size_t n = strlen(prefix);
+    while (n > 0 && prefix[n - 1] == '/') prefix[--n] = '\0';
+    if (!host[0]) return sqlite3_mprintf("");
+    return sqlite3_mprintf("%s://%s%s%s/collections/%s/tiles/%s/", strcmp(proto, "https") ? "http" : "https", host,
+                           n > 0 && prefix[0] != '/' ? "/" : "", prefix, r->terrain, r->segments[KIND]);
+}
+
+static int make_document(tiles *t, const request *r, tile_bytes *out, char **error) {
+    char *root = find_root(r);
+    const int code = root ? tiles_document(t, root, 0, tiles_finest(t), out, error) : SQLITE_NOMEM;
+    sqlite3_free(root);
+    return code;
+}
+
 static int make(tiles *t, const request *r, int series, tile_bytes *out, char **error) {
     const char *const *place = r->segments + r->segment_count - 3;
-    if (series < 0) return tiles_document(t, "", 0, tiles_finest(t), out, error);
+    if (series < 0) return make_document(t, r, out, error);
     return tiles_make(t, series, atoi(place[0]), atoi(place[1]), atoi(place[2]), out, error);
 }
 

@@ -146,6 +146,12 @@ int store_get_block(store *s, const store_terrain *t, rqt_block_number number, c
     return code;
 }
 
+int store_read_block(store *s, const store_terrain *t, rqt_block_number number, const rqt_block **block,
+                     char **error) {
+    int read;
+    return store_get_block(s, t, number, block, &read, error);
+}
+
 static int window(store *s, const store_terrain *t, int32_t col, int32_t row, int32_t width, int32_t height,
                   int32_t *q, uint8_t *valid, char **error) {
     if (col < 0 || row < 0 || width < 1 || height < 1 || col > t->lattice.width - width ||

@@ -132,6 +132,10 @@ store_limits *store_limits_of(store *s);
 /* Memory that a metric which is not stored may take, heights included. */
 #define STORE_METHOD_MEMORY ((size_t)512 << 20)
 void store_limit_methods(store *s, size_t bytes);
+/* A block, decoded, with its corners: what it answers with for its own em, which is block->floor (0 at stride 1).
+ * Between store_begin and store_end; valid until the next call that reads blocks. */
+int store_read_block(store *s, const store_terrain *t, rqt_block_number number, const rqt_block **block,
+                     char **error);
 /* Full-resolution samples of a window inside the raster, for width*height values each, row by row. */
 int store_window(store *s, const store_terrain *t, int32_t col, int32_t row, int32_t width, int32_t height,
                  int32_t *q, uint8_t *valid, char **error);

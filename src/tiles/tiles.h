@@ -4,6 +4,8 @@
  * squares of 180 / 2^z degrees, x from -180 degrees on, y from the south (TMS, global geodetic).
  *   3d-tiles        3D Tiles 1.1: an implicit tileset, glTF in geocentric coordinates. Tiles are the cells of the
  * terrain's own blocks, x from the west, y from the south.
+ *   terrarium       heights as colours of PNG, in Web Mercator (Mapzen, AWS; MapLibre, deck.gl). 2^z by 2^z tiles
+ * of 256 x 256 pixels, y from the north.
  *
  * A kind is one or more series of tiles, each with levels of ranges of them, and one document that tells clients of
  * them. The bytes of a tile are a function of the terrain alone: the service and the command give the same.
