@@ -312,6 +312,7 @@ bench-tiles: ## tiles for globes: a pyramid of 4097 x 4097 written, and tiles as
 	@./src/install-packages.sh build test
 	@$(MAKE) --no-print-directory -j2 products
 	@RQT=$(BUILD)/rqt RQT_SO=$(BUILD)/rqt.so /usr/bin/python3 tests/bench/bench_tiles.py
+	@RQT=$(BUILD)/rqt RQT_SO=$(BUILD)/rqt.so /usr/bin/python3 tests/bench/bench_tiles3d.py
 bench-views: ## what views cost: one megapixel, fly-overs, ETOPO5 over a network, beside the papers' figures
 	@./src/install-packages.sh build test
 	@./src/install-packages.sh views || echo "No ETOPO5: the table goes without" >&2
