@@ -4,6 +4,7 @@ The decoder is written from the format's description (CesiumGS/quantized-mesh), 
 the places in space are computed here: nothing is asked of the program but tiles.
 """
 import bisect
+import fcntl
 import gzip
 import itertools
 import json
@@ -618,6 +619,10 @@ before = os.stat(os.path.join(again, kept)).st_ino
 s.equal("the same command goes on there", s.run(command + ["--jobs", "2"]), ("", 0))
 s.equal("... and the folder is that of one that was not killed, byte for byte", files(again), whole)
 s.equal("... without making again what was there", os.stat(os.path.join(again, kept)).st_ino, before)
+with open(again + "/.rqt-tiles", "rb") as held:
+    fcntl.flock(held, fcntl.LOCK_EX)
+    out, status = s.run(command)
+s.check("... by one command at a time", status == 1 and "another rqt tiles is at work there" in out, out)
 out, status = s.run([s.RQT, "tiles", ALPS.database, "-o", again])
 s.check("tiles of another terrain are not mixed in", status == 1 and "holds tiles of another terrain" in out, out)
 out, status = s.run(command + ["--gzip"])

@@ -58,6 +58,7 @@ MUTANTS = [
     ("tiles: all is made again", PYRAMID, "if (stat(path, &there) == 0) return SQLITE_OK;", "(void)there;", TILES, "without making again"),
     ("tiles: anybody's folder will do", PYRAMID, "if ((size_t)n == size && memcmp(there, description, size) == 0) return SQLITE_OK;", "return SQLITE_OK;", TILES, "are not mixed in"),
     ("tiles: what nobody says anything of is ours", PYRAMID, "if (n == 0) code = check_empty(job->folder, error);", "if (n < 0) code = check_empty(job->folder, error);", TILES, "says nothing of its files"),
+    ("tiles: two commands write into one folder", PYRAMID, "if (flock(*file, LOCK_EX | LOCK_NB))", "if (flock(*file, LOCK_UN))", TILES, "by one command at a time"),
     ("tiles: gzip is not asked for", PYRAMID, "if (p->job->gzip && !series->is_packed) code = pack(&tile);", "", TILES, "all tiles are compressed"),
     ("tiles: numbers of paths may begin with 0", "src/serve/endpoints.c", "|| (digits > 1 && *segment == '0')", "", TILES, "no tile at 00/1/0"),
     ("tiles: what is behind a number does not matter", "src/serve/endpoints.c", "return strlen(segment + digits) == rest && memcmp(segment + digits, close + 1, rest) == 0;", "return rest + 1 > 0;", TILES,
