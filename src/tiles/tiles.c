@@ -68,6 +68,20 @@ geo_extent tiles_extent(const store_terrain *t) {
                         .highest = fmax(low, high)};
 }
 
+int tiles_print(cJSON *document, tile_bytes *out) {
+    char *text = cJSON_PrintUnformatted(document);
+    const size_t size = text ? strlen(text) : 0;
+    *out = (tile_bytes){.bytes = text ? sqlite3_malloc64(size + 1) : NULL};
+    if (out->bytes) {
+        memcpy(out->bytes, text, size);
+        out->bytes[size] = '\n';
+        out->size = size + 1;
+    }
+    cJSON_free(text);
+    cJSON_Delete(document);
+    return out->bytes ? SQLITE_OK : SQLITE_NOMEM;
+}
+
 int tiles_has_triangle(tiles *t, const rqt_region *region, double eps, const store_query_options *options,
                        bool *is_there, char **error) {
     store_limits *limits = store_limits_of(t->store);
@@ -96,20 +110,6 @@ int tiles_add_range(range_list *list, tile_range range) {
     }
     list->items[list->count++] = range;
     return SQLITE_OK;
-}
-
-int tiles_print(cJSON *document, tile_bytes *out) {
-    char *text = cJSON_PrintUnformatted(document);
-    const size_t size = text ? strlen(text) : 0;
-    *out = (tile_bytes){.bytes = text ? sqlite3_malloc64(size + 1) : NULL};
-    if (out->bytes) {
-        memcpy(out->bytes, text, size);
-        out->bytes[size] = '\n';
-        out->size = size + 1;
-    }
-    cJSON_free(text);
-    cJSON_Delete(document);
-    return out->bytes ? SQLITE_OK : SQLITE_NOMEM;
 }
 
 /* -------------------------------------------------------------------------------------------- a connection -- */
