@@ -14,37 +14,59 @@
 
 #include <math.h>
 
-/* Columns and rows of the block's lattice, and which pixels come next. */
-static void place_lattice(const rqt_block_place *p, lattice *l) {
-    const pixel_grid *g = l->g;
-    const int32_t last_col = g->terrain->lattice.width - 1, last_row = g->terrain->lattice.height - 1;
-    int i = 0, j = 0;
-    for (int n = 0; n < l->n; n++) {
-        const int64_t by = (int64_t)n * p->stride, col = p->x + by, row = p->y + by;
-        l->col[n] = (double)(col < last_col ? col : last_col);
-        l->row[n] = (double)(row < last_row ? row : last_row);
-        while (i < GRID && g->col[i] < l->col[n] - SLACK) i++;
-        while (j < GRID && g->row[j] < l->row[n] - SLACK) j++;
-        l->first_col[n] = i;
-        l->first_row[n] = j;
+/* The first pixel that is at a place or beyond. */
+static int next_pixel(const double *pixels, double place) {
+    int from = 0, to = GRID;
+    while (from < to) {
+        const int middle = (from + to) / 2;
+        if (pixels[middle] < place - SLACK)
+            from = middle + 1;
+        else
+            to = middle;
+    }
+    return from;
+}
+
+/* Which pixels are next to the lattice's lines, from one to another: those at or beyond them, and the cells that
+ * they are in. */
+static void find_cells(const double *lines, int line, int last, const double *pixels, int *first, int *cells) {
+    int next = next_pixel(pixels, lines[line]);
+    for (; line <= last; line++) {
+        while (next < GRID && pixels[next] < lines[line] - SLACK) next++;
+        const int cell = next < GRID && pixels[next] <= lines[line] ? next : next - 1;
+        first[line] = next;
+        cells[line] = cell < GRID - 1 ? cell : -1;
     }
 }
 
-/* The pixel before a place of the lattice, of those that come next. */
-static int cell_before(int first, const double *pixels, double place) {
-    const int cell = first < GRID && pixels[first] <= place ? first : first - 1;
-    return cell < GRID - 1 ? cell : -1;
+/* The lines that are around the pixels, and one more on either side. */
+static void clip(const double *lines, const double *pixels, int *first, int *last) {
+    while (*first < *last && lines[*first + 1] < pixels[0]) ++*first;
+    while (*last > *first && lines[*last - 1] > pixels[GRID - 1]) --*last;
 }
 
-/* Where the lattice's lines lie between those of pixels. */
-static void find_cells(lattice *l) {
+/* The lattice's lines among those of pixels. Triangles that reach beyond the raster may be larger than the box. */
+static void place_lattice(const rqt_block_place *p, lattice *l, lattice_box *box) {
     const pixel_grid *g = l->g;
-    for (int n = 0; n < l->n; n++) {
-        const int i = cell_before(l->first_col[n], g->col, l->col[n]),
-                  j = cell_before(l->first_row[n], g->row, l->row[n]);
-        l->cell_col[n] = i;
-        l->cell_row[n] = j;
+    const int32_t last_col = g->terrain->lattice.width - 1, last_row = g->terrain->lattice.height - 1;
+    const int last = l->n - 1;
+    for (int n = 0; n <= last; n++) {
+        const int64_t by = (int64_t)n * p->stride, col = p->x + by, row = p->y + by;
+        l->col[n] = (double)(col < last_col ? col : last_col);
+        l->row[n] = (double)(row < last_row ? row : last_row);
+    }
+    clip(l->col, g->col, &box->west, &box->east);
+    clip(l->row, g->row, &box->north, &box->south);
+    l->is_squeezed = p->side > last_col - p->x || p->side > last_row - p->y;
+    const lattice_box placed = l->is_squeezed ? (lattice_box){0, last, 0, last} : *box;
+    find_cells(l->col, placed.west, placed.east, g->col, l->first_col, l->cell_col);
+    find_cells(l->row, placed.north, placed.south, g->row, l->first_row, l->cell_row);
+    for (int n = box->west; n <= box->east; n++) {
+        const int i = l->cell_col[n];
         l->u[n] = i < 0 ? 0 : (l->col[n] - g->col[i]) * g->per_col;
+    }
+    for (int n = box->north; n <= box->south; n++) {
+        const int j = l->cell_row[n];
         l->v[n] = j < 0 ? 0 : (l->row[n] - g->row[j]) * g->per_row[j];
     }
 }
@@ -90,12 +112,12 @@ static void fill_middle(lattice *l, int x, int y, int half, bool is_main) {
     const size_t nw = at - up - by, ne = at - up + by, sw = at + up - by, se = at + up + by;
     const size_t a = is_main ? nw : ne, b = is_main ? se : sw;
     double *h = l->metres;
+    l->what[at] = l->what[a] & l->what[b] & HAS_HEIGHT;
+    h[at] = (h[a] + h[b]) / 2;
+    if (!l->is_squeezed) return;
     const double fx = share(l->col[x - half], l->col[x], l->col[x + half]),
                  fy = share(l->row[y - half], l->row[y], l->row[y + half]);
-    l->what[at] = l->what[a] & l->what[b] & HAS_HEIGHT;
-    if (fx == 0.5 && fy == 0.5)
-        h[at] = (h[a] + h[b]) / 2;
-    else if (is_main)
+    if (is_main)
         h[at] = fx > fy ? h[nw] + fx * (h[ne] - h[nw]) + fy * (h[se] - h[ne])
                         : h[nw] + fy * (h[sw] - h[nw]) + fx * (h[se] - h[sw]);
     else
@@ -128,13 +150,14 @@ static void fill_squares(lattice *l, const lattice_box *box, int half, bool is_m
                 fill_middle(l, x, y, half, size == n - 1 ? is_main : (x / size + y / size) % 2 == 0);
     for (int y = north; y <= south; y += half) {
         const bool is_across = y / half % 2 == 0;
-        const double down = is_across ? 0 : share(l->row[y - half], l->row[y], l->row[y + half]);
+        const double down =
+            is_across || !l->is_squeezed ? 0.5 : share(l->row[y - half], l->row[y], l->row[y + half]);
         const size_t by = is_across ? (size_t)half : (size_t)half * (size_t)n;
         for (int x = is_across ? west + half : west; x <= east; x += size) {
             const size_t at = (size_t)y * (size_t)n + (size_t)x;
             if (take_sample(l, at)) continue;
             fill_between(l, at, at - by, at + by,
-                         is_across ? share(l->col[x - half], l->col[x], l->col[x + half]) : down);
+                         is_across && l->is_squeezed ? share(l->col[x - half], l->col[x], l->col[x + half]) : down);
         }
     }
 }
@@ -164,12 +187,6 @@ static void fill(lattice *l, const lattice_box *box, bool has_all, bool is_main)
     l->has_voids = !valid;
 }
 
-/* The lines that are around the pixels, and one more on either side. */
-static void clip(const double *lines, const double *pixels, int *first, int *last) {
-    while (*first < *last && lines[*first + 1] < pixels[0]) ++*first;
-    while (*last > *first && lines[*last - 1] > pixels[GRID - 1]) --*last;
-}
-
 int lattice_read(tiles *t, const rqt_block_place *place, rqt_block_number number, lattice *l, lattice_box *box,
                  char **error) {
     const int code = store_read_block(t->store, t->terrain, number, &l->block, error);
@@ -178,10 +195,7 @@ int lattice_read(tiles *t, const rqt_block_place *place, rqt_block_number number
     l->n = (1 << t->terrain->k) + 1;
     l->turned = l->n == 2 && !is_main;
     l->floor = has_all ? 0 : rqt_code_metres(l->block->floor);
-    place_lattice(place, l);
-    find_cells(l);
-    clip(l->col, l->g->col, &box->west, &box->east);
-    clip(l->row, l->g->row, &box->north, &box->south);
+    place_lattice(place, l, box);
     fill(l, box, has_all, is_main);
     const lattice_box pixels = lattice_window_of(l, box).pixels;
     find_pixels(l->col, box->west, box->east, l->g->col, pixels.west, pixels.east, l->at_col, l->fx);

@@ -19,6 +19,7 @@ typedef struct lattice {
     const rqt_block *block; /* until another one is read */
     int n;                  /* vertices a side */
     int turned;             /* 1: the diagonals are the other way around, as in a block of one cell */
+    bool is_squeezed;       /* reaches beyond the raster */
     bool has_voids;         /* in the box */
     double scale, zero;     /* metres of a block's height, and of 0 */
     double floor;           /* metres: samples in leaves with three corners are no further off */

@@ -34,7 +34,7 @@
 #define DEGREE 0.017453292519943295
 #define ROUNDED 1e-4 /* metres: what doubles and SLACK are */
 #define TIGHT 1.25
-enum { MOST_SPLITS = 1000, BOX = 16 };
+enum { MOST_SPLITS = 1200, BOX = 8 };
 
 /* A box of a block, BOX cells a side, or all of a smaller block; and what is known of the samples in it. */
 typedef struct part {
@@ -193,8 +193,8 @@ static double measure_rows(const lattice *l, const lattice_window *w) {
     return most;
 }
 
-/* Rows of pixels where columns of the lattice cross them, and the pixels. */
-static double measure_pixels(const lattice *l, const lattice_window *w) {
+/* Rows of pixels where columns of the lattice cross them. */
+static double measure_cols(const lattice *l, const lattice_window *w) {
     const pixel_grid *g = l->g;
     double most = -1;
     for (int j = w->pixels.north; j <= w->pixels.south; j++) {
@@ -208,11 +208,19 @@ static double measure_pixels(const lattice *l, const lattice_window *w) {
             const double off = fabs(h[a] + fy * (h[b] - h[a]) - drawn);
             if (off > most) most = off;
         }
+    }
+    return most;
+}
+
+static double measure_pixels(const lattice *l, const lattice_window *w) {
+    const pixel_grid *g = l->g;
+    double most = -1;
+    for (int j = w->pixels.north; j <= w->pixels.south; j++) {
         for (int i = w->pixels.west; i <= w->pixels.east; i++) {
-            const size_t at = row + (size_t)i;
+            const size_t at = (size_t)j * GRID + (size_t)i;
             double metres;
             if (g->code[at] == NO_HEIGHT || !is_needed(g, i, j)) continue;
-            if (!lattice_height(l, l->at_col[i], l->at_row[j], l->fx[i], fy, &metres)) continue;
+            if (!lattice_height(l, l->at_col[i], l->at_row[j], l->fx[i], l->fy[j], &metres)) continue;
             const double off = fabs(metres - g->height[at]);
             if (off > most) most = off;
         }
@@ -223,14 +231,14 @@ static double measure_pixels(const lattice *l, const lattice_window *w) {
 /* Does a cell of the lattice meet one of pixels that is whole? */
 static bool is_drawn(const lattice *l, int x, int y) {
     const int west = l->first_col[x] - 1, north = l->first_row[y] - 1;
-    for (int j = north < 0 ? 0 : north; j <= l->first_row[y + 1] && j < GRID; j++)
-        for (int i = west < 0 ? 0 : west; i <= l->first_col[x + 1] && i < GRID; i++)
+    for (int j = north < 0 ? 0 : north; j < l->first_row[y + 1]; j++)
+        for (int i = west < 0 ? 0 : west; i < l->first_col[x + 1]; i++)
             if (l->g->is_whole[j * GRID + i]) return true;
     return false;
 }
 
-/* Cells of the lattice: a quarter of the largest twist; what is no whole cell; and whether samples may be there that
- * are between pixels, but in leaves without a height. */
+/* Cells of the lattice: a quarter of the largest twist; what is no whole cell; and whether samples may be there
+ * that are between pixels, but in leaves without a height. */
 static double measure_cells(const lattice *l, const lattice_box *box, double *twist, bool *has_holes) {
     const pixel_grid *g = l->g;
     double most = -1;
@@ -260,15 +268,16 @@ static double measure(const lattice *l, const rqt_block_place *place, const latt
     corner halves[2][3];
     double twist;
     const double triangles = measure_cells(l, box, &twist, has_holes);
-    const double most = fmax(fmax(at_vertices, triangles), fmax(measure_pixels(l, w), measure_rows(l, w)));
+    const double at_pixels = measure_pixels(l, w);
+    const double at_corners = fmax(fmax(at_vertices, at_pixels < 0 ? -1 : at_pixels + twist),
+                                   fmax(measure_cols(l, w), measure_rows(l, w)));
+    const double most = fmax(at_corners < 0 ? -1 : at_corners + twist, triangles);
     double beyond = -1;
-    const corner both[3] = {lattice_corner(l, box->west, box->north), lattice_corner(l, box->east, box->south),
-                            lattice_corner(l, box->east, box->north)};
-    if (lattice_straddles(l, place, both)) {
+    if (l->is_squeezed) {
         lattice_halves(l, place, halves);
         for (int i = 0; i < 2; i++) beyond = fmax(beyond, measure_straddling(l, place, box, halves[i]));
     }
-    return most < 0 ? beyond : fmax(most + 2 * twist, beyond);
+    return fmax(most, beyond);
 }
 
 /* -------------------------------------------------------------------------------------- branch and bound -- */
