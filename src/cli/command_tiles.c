@@ -17,6 +17,7 @@ static const char HELP[] =
     "\n"
     "Kinds:\n"
     "  quantized-mesh       z/x/y.terrain, layer.json: Cesium and other globes\n"
+    "  3d-tiles             content/level/x/y.glb, subtrees/level/x/y.subtree, tileset.json: 3D Tiles 1.1\n"
     "  terrarium            z/x/y.png, tile.json: MapLibre, deck.gl and other maps; heights as they are\n"
     "\n"
     "Options:\n"

@@ -17,6 +17,9 @@
  *
  * And every vertex of the closed cell but its corners descends from C (core/summary.c): none has an error above e.
  *
+ * Nor, without the centre's outline bit, is either half mixed, or any triangle in it: all of their samples are
+ * valid or all are void, and as the halves have two corners in common, all of the cell's are alike.
+ *
  * Heights are widened by half a quantum, where samples were rounded to them, and by what doubles round away.
  *
  * Summaries are hostile. Whatever they say, a range lies in the one above and is not empty: where the two have
@@ -35,7 +38,7 @@ static void set_range(const store_terrain *t, double a, double b, double by, sto
 }
 
 store_relief store_relief_of_all(const store_terrain *t) {
-    store_relief all = {.error = t->max_error};
+    store_relief all = {.error = t->max_error, .is_mixed = t->voids > 0, .is_valid = t->voids == 0};
     set_range(t, rqt_unit_metres(&t->unit, t->min_q), rqt_unit_metres(&t->unit, t->max_q), 0, &all);
     return all;
 }
@@ -47,6 +50,10 @@ int store_find_relief(store *s, const store_terrain *t, rqt_block_number number,
     const int code = store_get_summary(s, t, number, &summary, error);
     if (code != SQLITE_OK) return code;
     if (summary->center_error < relief->error) relief->error = summary->center_error;
+    if (relief->is_mixed && !(summary->center_flags & RQT_OUTLINE)) {
+        relief->is_mixed = false;
+        relief->is_valid = summary->corner[0].flags & RQT_VALID;
+    }
     double low = INFINITY, high = -INFINITY;
     for (int c = 0; c < 4; c++) {
         if (!(summary->corner[c].flags & RQT_VALID)) return SQLITE_OK;
@@ -63,4 +70,38 @@ int store_find_relief(store *s, const store_terrain *t, rqt_block_number number,
     relief->lowest = fmax(relief->lowest, own.lowest);
     relief->highest = fmin(relief->highest, own.highest);
     return SQLITE_OK;
+}
+
+/* Let X be the largest error finer than the grids of level l, and b a block of that level with em(b) = X > 0. Going
+ * down from b to children with the same em as long as there are any, one comes to a block with em = X whose
+ * children all have less, for at stride 1 em is 0: each of these answers from its own em up to below X. And no
+ * block below level l has a larger em_parent. So X is the largest end of an interval below level l: those that
+ * never answer need not be known. */
+int store_level_errors(store *s, const store_terrain *t, rqt_code *largest, char **error) {
+    const int levels = rqt_block_levels(&t->lattice, t->k);
+    sqlite3_stmt *row = NULL;
+    int64_t end[RQT_MAX_K + 2] = {0};
+    int code = store_begin_on(s, t, error);
+    if (code != SQLITE_OK) return code;
+    char *sql = sqlite3_mprintf("SELECT id, tol1 FROM \"%w\".rqt_index_%lld%s", t->schema, t->id, t->suffix);
+    code = sql ? sqlite3_prepare_v2(s->db, sql, -1, &row, NULL) : SQLITE_NOMEM;
+    sqlite3_free(sql);
+    while (code == SQLITE_OK && (code = sqlite3_step(row)) == SQLITE_ROW) {
+        const uint64_t number = (uint64_t)sqlite3_column_int64(row, 0);
+        const int level = number ? (63 - __builtin_clzll(number)) / 2 : 0;
+        const int64_t above = sqlite3_column_int64(row, 1) + 1;
+        code = SQLITE_OK;
+        if (level > 0 && level < levels && above <= RQT_CODE_LARGEST && above > end[level]) end[level] = above;
+    }
+    if (code == SQLITE_DONE)
+        code = SQLITE_OK;
+    else if (code != SQLITE_NOMEM)
+        code = store_fail_db(error, s->db, code, "reading the index");
+    sqlite3_finalize(row);
+    for (int l = levels - 1; l >= 0; l--) {
+        if (end[l + 1] > end[l]) end[l] = end[l + 1];
+        largest[l] = (rqt_code)end[l + 1];
+    }
+    store_end(s);
+    return code;
 }

@@ -153,6 +153,8 @@ typedef struct store_relief {
     double lowest,
         highest;    /* metres: no valid sample is beyond; of heights as they were before they were rounded */
     rqt_code error; /* no vertex but the square's corners has a larger one */
+    bool is_mixed;  /* there may be samples and voids in it; else is_valid tells which */
+    bool is_valid;
 } store_relief;
 /* Of the whole terrain. */
 store_relief store_relief_of_all(const store_terrain *t);
@@ -160,6 +162,10 @@ store_relief store_relief_of_all(const store_terrain *t);
  * store_end. SQLITE_CORRUPT_VTAB when the two have no height in common. */
 int store_find_relief(store *s, const store_terrain *t, rqt_block_number number, store_relief *relief,
                       char **error);
+
+/* largest[l], for each level l of blocks: no vertex finer than the grids of that level has a larger error (outline
+ * `tol`), and one has that. By the index alone, all of which is read. largest has room for RQT_MAX_K + 1. */
+int store_level_errors(store *s, const store_terrain *t, rqt_code *largest, char **error);
 
 /* How far check has come, and what it found: severity (so far always "error"), block 0 when it is not about one. */
 typedef struct store_finding {

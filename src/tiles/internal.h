@@ -12,6 +12,7 @@
  *   encode.c   bytes
  *   layer.c    which tiles there are; layer.json
  *
+ * 3d-tiles (tileset.c): block.h
  * terrarium: terrarium.h
  */
 #ifndef RQT_TILES_INTERNAL_H
@@ -49,7 +50,7 @@ typedef struct tile_functions {
     int (*make)(tiles *t, int series, int z, int32_t x, int32_t y, tile_bytes *out, char **error);
     int (*document)(tiles *t, const char *root, int first, int last, tile_bytes *out, char **error);
 } tile_functions;
-extern const tile_kind quantized_mesh, terrarium;
+extern const tile_kind quantized_mesh, tiles_3d, terrarium;
 
 /* A sentence into *error; returns SQLITE_ERROR, or SQLITE_NOMEM. */
 int tiles_fail(char **error, const char *format, ...) __attribute__((format(printf, 2, 3)));

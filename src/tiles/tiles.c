@@ -8,7 +8,7 @@
 #include <stdio.h>
 #include <string.h>
 
-const tile_kind *const tile_kinds[] = {&quantized_mesh, &terrarium, NULL};
+const tile_kind *const tile_kinds[] = {&quantized_mesh, &tiles_3d, &terrarium, NULL};
 
 const tile_kind *tiles_kind(const char *name) {
     for (const tile_kind *const *kind = tile_kinds; *kind; kind++)

@@ -2,6 +2,8 @@
  *
  *   quantized-mesh  quantized-mesh 1.0 (CesiumGS/quantized-mesh), cut from the terrain's own mesh. Tiles are
  * squares of 180 / 2^z degrees, x from -180 degrees on, y from the south (TMS, global geodetic).
+ *   3d-tiles        3D Tiles 1.1: an implicit tileset, glTF in geocentric coordinates. Tiles are the cells of the
+ * terrain's own blocks, x from the west, y from the south.
  *   terrarium       heights as colours of PNG, in Web Mercator (Mapzen, AWS; MapLibre, deck.gl). 2^z by 2^z tiles
  * of 256 x 256 pixels, y from the north.
  *

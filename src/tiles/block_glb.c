@@ -1,0 +1,228 @@
+/* block_glb.c - a tile's mesh as glTF 2.0, binary:
+ *
+ *   'glTF', u32 2, u32 size;  u32 size, 'JSON', text, blanks to 4 bytes;  u32 size, 'BIN', the buffer, zeros to 4
+ *   buffer: positions of all vertices, three floats each; normals, three i8 and a zero; indices, u16 where they fit
+ *
+ * Axes. Clients of 3D Tiles turn glTF's y-up into their z-up, (x, y, z) to (x, -z, y): so a geocentric (X, Y, Z) is
+ * (X, Z, -Y) here.
+ *
+ * Where it is. The node's translation has the origin, whole metres and steps, which is a double there whatever it
+ * is printed with: clients of 3D Tiles add it to their matrices in double (CesiumJS, three's 3DTilesRendererJS),
+ * unlike viewers of models (format/glb.c). Positions are whole steps from it, as floats exactly. What two tiles
+ * share is decoded to the same doubles in both: translation + position is exact.
+ *
+ * Extras have what the tile is off (block_tile.c), as the subtree does.
+ */
+#include "block.h"
+#include "format.h"
+
+#include <cjson/cJSON.h>
+#include <math.h>
+#include <string.h>
+
+enum { HEAD = 12, CHUNK = 8, POSITION_BYTES = 12, NORMAL_BYTES = 4, MOST_SHORT_INDEX = 65535 };
+enum { UNSIGNED_SHORT = 5123, BYTE = 5120, UNSIGNED_INT = 5125, FLOAT = 5126, ARRAY = 34962, ELEMENTS = 34963 };
+
+static size_t padded(size_t size) {
+    return (size + 3) / 4 * 4;
+}
+
+/* 65535 itself is kept free: it means restart in some libraries of graphics. */
+static size_t index_bytes(const block_mesh *mesh) {
+    return mesh->patch.vertex_count <= MOST_SHORT_INDEX ? 2 : 4;
+}
+
+char *block_attribution(const store_terrain *t) {
+    char *text = sqlite3_mprintf("%s", t->source);
+    for (char *p = text; p && *p; p++)
+        if (*p == '\n') *p = p[1] ? ' ' : 0;
+    return text;
+}
+
+/* ---------------------------------------------------------------------------------------------------- JSON -- */
+
+/* Digits that read back equal; cJSON's are off by one in the last place at times. */
+static cJSON *number(double value) {
+    char digits[32];
+    const int n = format_double(value, digits);
+    digits[n] = 0;
+    return cJSON_CreateRaw(digits);
+}
+
+static void add_numbers(cJSON *to, const char *name, const double values[3]) {
+    cJSON *list = cJSON_AddArrayToObject(to, name);
+    for (int i = 0; i < 3; i++) cJSON_AddItemToArray(list, number(values[i]));
+}
+
+static void add_asset(const tiles *t, block_tile tile, double error, cJSON *json) {
+    cJSON *asset = cJSON_AddObjectToObject(json, "asset");
+    cJSON_AddStringToObject(asset, "version", "2.0");
+    cJSON_AddStringToObject(asset, "generator", "rqt " RQT_VERSION);
+    char *source = block_attribution(t->terrain);
+    if (source && *source) cJSON_AddStringToObject(asset, "copyright", source);
+    sqlite3_free(source);
+    cJSON *told = cJSON_AddObjectToObject(cJSON_AddObjectToObject(asset, "extras"), "rqt");
+    cJSON_AddStringToObject(told, "terrain", t->terrain->name);
+    cJSON_AddNumberToObject(told, "level", tile.level);
+    cJSON_AddItemToObject(told, "error", number(error));
+    cJSON_AddItemToObject(told, "step", number(block_plan_of(t)->level[tile.level].step));
+}
+
+static void add_view(cJSON *views, size_t at, size_t size, int stride, int target) {
+    cJSON *view = cJSON_CreateObject();
+    cJSON_AddNumberToObject(view, "buffer", 0);
+    cJSON_AddNumberToObject(view, "byteOffset", (double)at);
+    cJSON_AddNumberToObject(view, "byteLength", (double)size);
+    if (stride) cJSON_AddNumberToObject(view, "byteStride", stride);
+    cJSON_AddNumberToObject(view, "target", target);
+    cJSON_AddItemToArray(views, view);
+}
+
+static cJSON *add_accessor(cJSON *accessors, int component, size_t count, const char *type) {
+    cJSON *accessor = cJSON_CreateObject();
+    cJSON_AddNumberToObject(accessor, "bufferView", cJSON_GetArraySize(accessors));
+    cJSON_AddNumberToObject(accessor, "componentType", component);
+    cJSON_AddNumberToObject(accessor, "count", (double)count);
+    cJSON_AddStringToObject(accessor, "type", type);
+    cJSON_AddItemToArray(accessors, accessor);
+    return accessor;
+}
+
+/* Geocentric to glTF's axes. */
+static void turn(const double xyz[3], double out[3]) {
+    out[0] = xyz[0];
+    out[1] = xyz[2];
+    out[2] = -xyz[1] + 0.0;
+}
+
+static void add_box(const block_mesh *mesh, double step, cJSON *positions) {
+    double low[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, high[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
+    for (size_t i = 0; i < mesh->patch.vertex_count; i++) {
+        const int32_t *o = mesh->offset + 3 * i;
+        const double xyz[3] = {o[0] * step, o[1] * step, o[2] * step};
+        double at[3];
+        turn(xyz, at);
+        for (int k = 0; k < 3; k++) {
+            low[k] = fmin(low[k], at[k]);
+            high[k] = fmax(high[k], at[k]);
+        }
+    }
+    add_numbers(positions, "min", low);
+    add_numbers(positions, "max", high);
+}
+
+static void add_scene(const block_mesh *mesh, cJSON *json) {
+    static const char *const extension = "KHR_mesh_quantization"; /* of normals in bytes */
+    cJSON_AddItemToObject(json, "extensionsUsed", cJSON_CreateStringArray(&extension, 1));
+    cJSON_AddItemToObject(json, "extensionsRequired", cJSON_CreateStringArray(&extension, 1));
+    cJSON_AddNumberToObject(json, "scene", 0);
+    cJSON_AddItemToObject(json, "scenes", cJSON_Parse("[{\"nodes\":[0]}]"));
+    cJSON *nodes = cJSON_AddArrayToObject(json, "nodes"), *node = cJSON_CreateObject();
+    double at[3];
+    turn(mesh->origin, at);
+    cJSON_AddNumberToObject(node, "mesh", 0);
+    add_numbers(node, "translation", at);
+    cJSON_AddItemToArray(nodes, node);
+    cJSON_AddItemToObject(json, "meshes",
+                          cJSON_Parse("[{\"primitives\":[{\"attributes\":{\"POSITION\":0,\"NORMAL\":1},"
+                                      "\"indices\":2,\"material\":0,\"mode\":4}]}]"));
+    cJSON_AddItemToObject(json, "materials",
+                          cJSON_Parse("[{\"doubleSided\":true,\"pbrMetallicRoughness\":{\"baseColorFactor\":"
+                                      "[0.6,0.58,0.5,1],\"metallicFactor\":0,\"roughnessFactor\":1}}]"));
+}
+
+/* NULL: no memory. */
+static char *describe(const tiles *t, block_tile tile, double error, const block_mesh *mesh) {
+    const size_t vertices = mesh->patch.vertex_count, indices = 3 * mesh->patch.triangle_count;
+    const size_t positions = POSITION_BYTES * vertices, normals = NORMAL_BYTES * vertices,
+                 elements = index_bytes(mesh) * indices;
+    cJSON *json = cJSON_CreateObject();
+    add_asset(t, tile, error, json);
+    add_scene(mesh, json);
+    cJSON *accessors = cJSON_AddArrayToObject(json, "accessors");
+    add_box(mesh, block_plan_of(t)->level[tile.level].step, add_accessor(accessors, FLOAT, vertices, "VEC3"));
+    cJSON_AddTrueToObject(add_accessor(accessors, BYTE, vertices, "VEC3"), "normalized");
+    add_accessor(accessors, index_bytes(mesh) == 2 ? UNSIGNED_SHORT : UNSIGNED_INT, indices, "SCALAR");
+    cJSON *views = cJSON_AddArrayToObject(json, "bufferViews");
+    add_view(views, 0, positions, POSITION_BYTES, ARRAY);
+    add_view(views, positions, normals, NORMAL_BYTES, ARRAY);
+    add_view(views, positions + normals, elements, 0, ELEMENTS);
+    cJSON *buffers = cJSON_AddArrayToObject(json, "buffers"), *buffer = cJSON_CreateObject();
+    cJSON_AddNumberToObject(buffer, "byteLength", (double)(positions + normals + elements));
+    cJSON_AddItemToArray(buffers, buffer);
+    char *text = cJSON_PrintUnformatted(json);
+    cJSON_Delete(json);
+    return text;
+}
+
+/* --------------------------------------------------------------------------------------------------- bytes -- */
+
+static uint8_t *put_u32(uint8_t *p, uint32_t n) {
+    for (int i = 0; i < 4; i++) *p++ = (uint8_t)(n >> 8 * i);
+    return p;
+}
+
+static uint8_t *put_u16(uint8_t *p, uint32_t n) {
+    *p++ = (uint8_t)n;
+    *p++ = (uint8_t)(n >> 8);
+    return p;
+}
+
+static uint8_t *put_float(uint8_t *p, float value) {
+    uint32_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    return put_u32(p, bits);
+}
+
+static uint8_t *put_chunk(uint8_t *p, size_t size, const char name[4]) {
+    p = put_u32(p, (uint32_t)padded(size));
+    memcpy(p, name, 4);
+    return p + 4;
+}
+
+static uint8_t *put_vertices(uint8_t *p, const block_mesh *mesh, double step) {
+    const size_t count = mesh->patch.vertex_count;
+    for (size_t i = 0; i < count; i++) {
+        const int32_t *o = mesh->offset + 3 * i;
+        p = put_float(p, (float)(o[0] * step));
+        p = put_float(p, (float)(o[2] * step));
+        p = put_float(p, (float)(-o[1] * step));
+    }
+    for (size_t i = 0; i < count; i++) {
+        const int8_t *n = mesh->normal + 3 * i;
+        *p++ = (uint8_t)n[0];
+        *p++ = (uint8_t)n[2];
+        *p++ = (uint8_t)-n[1];
+        *p++ = 0;
+    }
+    return p;
+}
+
+int block_glb_make(tiles *t, block_tile tile, const block_mesh *mesh, tile_bytes *out, char **error) {
+    const rqt_patch *patch = &mesh->patch;
+    store_relief relief;
+    int code = block_relief_from_root(t, tile, &relief, error);
+    if (code != SQLITE_OK) return code;
+    char *text = describe(t, tile, block_error(t, tile, &relief), mesh);
+    const size_t length = text ? strlen(text) : 0;
+    const size_t data =
+        (POSITION_BYTES + NORMAL_BYTES) * patch->vertex_count + index_bytes(mesh) * 3 * patch->triangle_count;
+    const size_t size = HEAD + 2 * CHUNK + padded(length) + padded(data);
+    uint8_t *bytes = text && size <= UINT32_MAX ? sqlite3_malloc64(size) : NULL;
+    if (bytes) {
+        uint8_t *p = bytes;
+        memcpy(p, "glTF", 4);
+        p = put_u32(put_u32(p + 4, 2), (uint32_t)size);
+        p = put_chunk(p, length, "JSON");
+        memset(p, ' ', padded(length));
+        memcpy(p, text, length);
+        p = put_chunk(p + padded(length), data, "BIN");
+        p = put_vertices(p, mesh, block_plan_of(t)->level[tile.level].step);
+        for (size_t i = 0; i < 3 * patch->triangle_count; i++)
+            p = index_bytes(mesh) == 2 ? put_u16(p, patch->triangles[i]) : put_u32(p, patch->triangles[i]);
+        memset(p, 0, (size_t)(bytes + size - p));
+        *out = (tile_bytes){bytes, size};
+    }
+    cJSON_free(text);
+    return bytes ? SQLITE_OK : SQLITE_NOMEM;
+}

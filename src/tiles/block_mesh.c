@@ -1,0 +1,198 @@
+/* block_mesh.c - the mesh of a tile: the terrain's own at the level's error, in the cell of a block, its corners
+ * forced. And its vertices in space.
+ *
+ * The rule is lowered by rank by what curvature takes; a rank of which curvature takes more than the level has to
+ * give, is in whatever its errors. On the last level only that is lowered: else what has any error is in. The cell
+ * is a square of the lattice, so that nothing is cut: every vertex is a sample, and its place, step and normal
+ * depend on the sample and the level alone. That is all that there is to seams.
+ *
+ * At a pole a row of samples is one place, at the antimeridian the first and the last column may be: both are
+ * rounded to the same steps, but for one that lies on the very edge between two; sines and cosines are off by 1e-9
+ * m there.
+ */
+#include "block.h"
+
+#include <math.h>
+#include <string.h>
+
+#define DEGREE 0.017453292519943295
+#define BEYOND_POLE (90 * (1 + 1e-9)) /* a row at a pole, by a rounding */
+#define A 6378137.0
+#define F (1 / 298.257223563)
+enum { NORMAL_UNITS = 127 };
+
+/* ---------------------------------------------------------------------------------------------------- mesh -- */
+
+static int make_rule(const tiles *t, block_tile tile, rqt_rule **rule) {
+    const block_plan *plan = block_plan_of(t);
+    const store_terrain *terrain = t->terrain;
+    const double error = plan->level[tile.level].error;
+    const int32_t side = 1 << (terrain->lattice.K - tile.level);
+    double lowering[RQT_RANKS];
+    for (int rank = 0; rank < RQT_RANKS; rank++) {
+        const double sag = block_sag(plan, rank);
+        const bool is_free = sag + terrain->quantum_error <= error;
+        lowering[rank] = !is_free ? 2 * error + 1 : tile.level == plan->finest ? error : sag;
+    }
+    rqt_status status = rqt_rule_create(&terrain->lattice, terrain->quantum_error, store_allocator(), rule);
+    if (status == RQT_OK) status = rqt_rule_set_lowering(*rule, lowering);
+    for (int corner = 0; corner < 4 && status == RQT_OK; corner++)
+        status =
+            rqt_rule_force(*rule, (rqt_vertex){(tile.i + (corner & 1)) * side, (tile.j + (corner >> 1)) * side});
+    return status == RQT_OK ? SQLITE_OK : SQLITE_NOMEM;
+}
+
+/* What to ask for the mesh of the north-western corner of a cell, its side so large a part of the cell's. Released
+ * by end_query, whatever came of it. */
+typedef struct cell_query {
+    rqt_region *region;
+    store_query_options options;
+} cell_query;
+
+static int begin_query(const tiles *t, block_tile tile, int32_t part, cell_query *q) {
+    const int32_t side = 1 << (t->terrain->lattice.K - tile.level);
+    const rqt_square square = {tile.i * side, tile.j * side, side / part};
+    const bool is_last = tile.level == block_plan_of(t)->finest;
+    *q = (cell_query){.options = {.select = RQT_SELECT_THRESHOLD,
+                                  .outline = is_last ? RQT_OUTLINE_EXACT : RQT_OUTLINE_TOL,
+                                  .metric = RQT_METRIC_EXACT,
+                                  .product = RQT_PRODUCT_TRIANGLES}};
+    const int code = make_rule(t, tile, &q->options.rule);
+    if (code != SQLITE_OK) return code;
+    const rqt_status status =
+        rqt_region_of_squares(&square, 1, &t->terrain->lattice, store_allocator(), &q->region);
+    return status == RQT_OK ? SQLITE_OK : SQLITE_NOMEM;
+}
+
+static void end_query(cell_query *q) {
+    rqt_region_free(q->region);
+    rqt_rule_free(q->options.rule);
+}
+
+static int query(tiles *t, block_tile tile, rqt_patch *patch, char **error) {
+    cell_query q;
+    int code = begin_query(t, tile, 1, &q);
+    if (code == SQLITE_OK)
+        code = store_query(t->store, t->terrain, q.region, block_plan_of(t)->level[tile.level].error, &q.options,
+                           patch, NULL, error);
+    end_query(&q);
+    return code;
+}
+
+int block_has_triangle(tiles *t, block_tile tile, int32_t part, bool *has, char **error) {
+    cell_query q;
+    *has = false;
+    int code = begin_query(t, tile, part, &q);
+    if (code == SQLITE_OK)
+        code = plan_has_triangle(t, q.region, block_plan_of(t)->level[tile.level].error, &q.options, has, error);
+    end_query(&q);
+    return code;
+}
+
+/* ------------------------------------------------------------------------------------------------ in space -- */
+
+/* Vertices have few columns and rows: the angle of each is kept for the next that has it. */
+enum { KEPT_ANGLES = 1024 };
+typedef struct angle {
+    int32_t number; /* of the column or row */
+    bool is_known;
+    double degrees, sine, cosine;
+} angle;
+typedef struct angles {
+    angle lon[KEPT_ANGLES], lat[KEPT_ANGLES];
+} angles;
+
+static const angle *find_angle(angle kept[KEPT_ANGLES], int32_t number, double degrees) {
+    angle *k = &kept[number % KEPT_ANGLES];
+    if (!k->is_known || k->number != number)
+        *k = (angle){number, true, degrees, sin(degrees * DEGREE), cos(degrees * DEGREE)};
+    return k;
+}
+
+static double latitude(const rqt_placement *at, int32_t row) {
+    const double degrees = at->y0 + row * at->dy;
+    return fabs(degrees) > 90 && fabs(degrees) <= BEYOND_POLE ? copysign(90, degrees) : degrees;
+}
+
+static int place_vertex(const tiles *t, const rqt_patch_vertex *v, const angle *lon, const angle *lat,
+                        double xyz[3], char **error) {
+    const double e2 = F * (2 - F), n = A / sqrt(1 - e2 * lat->sine * lat->sine);
+    const double place[3] = {lon->degrees, lat->degrees, rqt_unit_metres(&t->terrain->unit, v->q)};
+    const double height = geo_frame_height(block_plan_of(t)->frame, place);
+    xyz[0] = (n + height) * lat->cosine * lon->cosine;
+    xyz[1] = (n + height) * lat->cosine * lon->sine;
+    xyz[2] = (n * (1 - e2) + height) * lat->sine;
+    if (fabs(lat->degrees) <= 90 && isfinite(xyz[0]) && isfinite(xyz[1]) && isfinite(xyz[2])) return SQLITE_OK;
+    return tiles_fail(error, "terrain %s has no place in space at %.15g, %.15g", t->terrain->name, lon->degrees,
+                      lat->degrees);
+}
+
+/* From east, north, up at a place. */
+static void turn_normal(const angle *lon, const angle *lat, const float enu[3], int8_t out[3]) {
+    const double east = (double)enu[0], north = (double)enu[1], up = (double)enu[2];
+    const double outward = lat->cosine * up - lat->sine * north; /* from the axis */
+    out[0] = (int8_t)rint(NORMAL_UNITS * (lon->cosine * outward - lon->sine * east));
+    out[1] = (int8_t)rint(NORMAL_UNITS * (lon->sine * outward + lon->cosine * east));
+    out[2] = (int8_t)rint(NORMAL_UNITS * (lat->cosine * north + lat->sine * up));
+}
+
+static int place_all(const tiles *t, const float *enu, angles *known, double *xyz, block_mesh *mesh, char **error) {
+    const rqt_placement *at = &t->terrain->placement;
+    int code = SQLITE_OK;
+    memset(known, 0, sizeof *known);
+    for (size_t i = 0; i < mesh->patch.vertex_count && code == SQLITE_OK; i++) {
+        const rqt_patch_vertex *v = &mesh->patch.vertices[i];
+        const angle *lon = find_angle(known->lon, v->col, at->x0 + v->col * at->dx),
+                    *lat = find_angle(known->lat, v->row, latitude(at, v->row));
+        code = place_vertex(t, v, lon, lat, xyz + 3 * i, error);
+        turn_normal(lon, lat, enu + 3 * i, mesh->normal + 3 * i);
+    }
+    return code;
+}
+
+/* xyz: of each vertex. */
+static void round_places(const double *xyz, size_t count, double step, block_mesh *mesh) {
+    const double unit = fmax(step, 1);
+    for (int k = 0; k < 3; k++) {
+        double low = xyz[k], high = xyz[k];
+        for (size_t i = 1; i < count; i++) {
+            low = fmin(low, xyz[3 * i + (size_t)k]);
+            high = fmax(high, xyz[3 * i + (size_t)k]);
+        }
+        mesh->origin[k] = rint((low + high) / 2 / unit) * unit + 0.0;
+        for (size_t i = 0; i < count; i++)
+            mesh->offset[3 * i + (size_t)k] =
+                (int32_t)(rint(xyz[3 * i + (size_t)k] / step) - mesh->origin[k] / step);
+    }
+}
+
+static int place_mesh(tiles *t, block_tile tile, block_mesh *mesh, char **error) {
+    const size_t count = mesh->patch.vertex_count;
+    double *xyz = sqlite3_malloc64(3 * count * sizeof *xyz);
+    angles *known = sqlite3_malloc64(sizeof *known);
+    float *enu = NULL;
+    mesh->offset = sqlite3_malloc64(3 * count * sizeof *mesh->offset);
+    mesh->normal = sqlite3_malloc64(3 * count * sizeof *mesh->normal);
+    int code = xyz && known && mesh->offset && mesh->normal ? SQLITE_OK : SQLITE_NOMEM;
+    if (code == SQLITE_OK) code = store_normals(t->store, t->terrain, &mesh->patch, &enu, error);
+    if (code == SQLITE_OK) code = place_all(t, enu, known, xyz, mesh, error);
+    if (code == SQLITE_OK) round_places(xyz, count, block_plan_of(t)->level[tile.level].step, mesh);
+    sqlite3_free(enu);
+    sqlite3_free(known);
+    sqlite3_free(xyz);
+    return code;
+}
+
+int block_mesh_make(tiles *t, block_tile tile, block_mesh *mesh, char **error) {
+    *mesh = (block_mesh){0};
+    int code = query(t, tile, &mesh->patch, error);
+    if (code == SQLITE_OK && mesh->patch.triangle_count > 0) code = place_mesh(t, tile, mesh, error);
+    return code;
+}
+
+void block_mesh_free(tiles *t, block_mesh *mesh) {
+    store_keep(t->store, &mesh->patch);
+    sqlite3_free(mesh->offset);
+    sqlite3_free(mesh->normal);
+    *mesh = (block_mesh){0};
+}
