@@ -19,10 +19,10 @@
  * pixels inside.
  *
  * Only the largest sum counts, and how large it is at least is known: vertices are samples. So this is a branch and
- * bound, as in core/update_bound: of the blocks the one with the largest sum gives way to its children, whose em
- * are smaller, down to stride 1, where there is nothing but vertices; until that sum is no more than TIGHT times
- * what was seen at vertices. Few blocks do. When it is noise, and there would be many, we stop after MOST_SPLITS,
- * and what is told is larger than need be.
+ * bound, as in core/update_bound: of the boxes of blocks the one with the largest sum gives way to its children,
+ * whose em are smaller, down to stride 1, where there is nothing but vertices; until that sum is no more than TIGHT
+ * times what was seen at vertices. Few boxes do. When it is noise, and there would be many, we stop after
+ * MOST_SPLITS, and what is told is larger than need be.
  *
  * In a child samples may be in leaves without a height though they are in one with three corners of its parent's:
  * then what was found for the parent holds.
