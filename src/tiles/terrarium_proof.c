@@ -119,16 +119,19 @@ static double measure_triangle(const lattice *l, const corner triangle[3]) {
     return most;
 }
 
-/* Leaves of which the cells of the lattice are not parts. */
+/* Leaves of which the cells of the lattice are not parts; has_holes: one has no height. */
 static double measure_straddling(const lattice *l, const rqt_block_place *place, const lattice_box *box,
-                                 const corner triangle[3]) {
+                                 const corner triangle[3], bool *has_holes) {
     const lattice_box b = lattice_box_of(triangle);
     corner children[2][3];
     if (b.west >= box->east || b.east <= box->west || b.north >= box->south || b.south <= box->north) return -1;
     if (lattice_misses(l, triangle) || !lattice_straddles(l, place, triangle)) return -1;
     if (lattice_split(l, triangle, children))
-        return fmax(measure_straddling(l, place, box, children[0]), measure_straddling(l, place, box, children[1]));
-    return triangle[0].valid && triangle[1].valid && triangle[2].valid ? measure_triangle(l, triangle) : -1;
+        return fmax(measure_straddling(l, place, box, children[0], has_holes),
+                    measure_straddling(l, place, box, children[1], has_holes));
+    if (triangle[0].valid && triangle[1].valid && triangle[2].valid) return measure_triangle(l, triangle);
+    *has_holes = true;
+    return -1;
 }
 
 /* The half of a cell that has a height though the other has none. */
@@ -275,7 +278,7 @@ static double measure(const lattice *l, const rqt_block_place *place, const latt
     double beyond = -1;
     if (l->is_squeezed) {
         lattice_halves(l, place, halves);
-        for (int i = 0; i < 2; i++) beyond = fmax(beyond, measure_straddling(l, place, box, halves[i]));
+        for (int i = 0; i < 2; i++) beyond = fmax(beyond, measure_straddling(l, place, box, halves[i], has_holes));
     }
     return fmax(most, beyond);
 }
