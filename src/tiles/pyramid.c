@@ -4,11 +4,13 @@
  * Workers take pieces of rows, each with a connection of its own; a tile's bytes depend on nothing but the terrain,
  * so it does not matter which makes it. Each file is written beside its place and renamed: it is there whole or not
  * at all, and what is there need not be made again. FOLDER/.rqt-tiles says of what the tiles are: terrain, state of
- * the database, options. A folder that says something else is another's, and is refused; while somebody works in it
- * the file is locked. The document comes last, so a folder that has it is complete.
+ * the database, options. A folder that says something else, or holds files and says nothing, is another's, and is
+ * refused; while somebody works in it the file is locked. The document comes last, so a folder that has it is
+ * complete.
  */
 #include "internal.h"
 
+#include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <pthread.h>
@@ -53,6 +55,19 @@ static int fail_file(char **error, const char *path) {
 
 static int make_folder(const char *path, char **error) {
     return mkdir(path, 0777) == 0 || errno == EEXIST ? SQLITE_OK : fail_file(error, path);
+}
+
+/* With those above it. */
+static int make_path(const char *folder, char **error) {
+    char path[MOST_PATH];
+    snprintf(path, sizeof path, "%s", folder);
+    for (char *slash = path + 1; (slash = strchr(slash, '/')) != NULL; slash++) {
+        *slash = 0;
+        const int code = make_folder(path, error);
+        if (code != SQLITE_OK) return code;
+        *slash = '/';
+    }
+    return make_folder(path, error);
 }
 
 /* Whole or not at all. */
@@ -102,10 +117,11 @@ static char *describe_job(const tiles_job *job, const tiles *t, int last) {
     if (stat(job->database, &file) || stat(path, &log)) log = (struct stat){0};
     return sqlite3_mprintf(
         "rqt %s\n%s of terrain %s of %s\ndatabase %lld bytes, %lld.%09ld s, log %lld bytes, %lld.%09ld s\n"
-        "levels %d to %d%s\n",
+        "levels %d to %d%s%s%s\n",
         RQT_VERSION, job->kind->name, t->terrain->name, t->terrain->created, (long long)file.st_size,
         (long long)file.st_mtim.tv_sec, (long)file.st_mtim.tv_nsec, (long long)log.st_size,
-        (long long)log.st_mtim.tv_sec, (long)log.st_mtim.tv_nsec, job->first, last, job->gzip ? ", gzip" : "");
+        (long long)log.st_mtim.tv_sec, (long)log.st_mtim.tv_nsec, job->first, last, job->gzip ? ", gzip" : "",
+        job->url ? " at " : "", job->url ? job->url : "");
 }
 
 /* Does a connection that has begun to read see what the tiles are of? Asked after it has begun: a commit in between
@@ -200,9 +216,9 @@ static void watch(pyramid *p, int64_t all) {
 }
 
 static int run_workers(pyramid *p, int64_t all, char **error) {
-    pthread_t threads[64];
+    pthread_t threads[MOST_WORKERS];
     int begun = 0;
-    const int wanted = p->job->workers < 1 ? 1 : p->job->workers > 64 ? 64 : p->job->workers;
+    const int wanted = p->job->workers;
     pthread_mutex_init(&p->lock, NULL);
     pthread_cond_init(&p->ended, NULL);
     p->working = wanted;
@@ -274,10 +290,24 @@ static int list_pieces(pyramid *p, tiles *t, int64_t *all, char **error) {
     return code;
 }
 
+/* Is there nothing in the folder but its description? Tiles that nobody says anything of would be taken for ours.
+ */
+static int check_empty(const char *folder, char **error) {
+    DIR *files = opendir(folder);
+    if (!files) return fail_file(error, folder);
+    bool is_empty = true;
+    for (const struct dirent *f; (f = readdir(files));)
+        is_empty &= !strcmp(f->d_name, ".") || !strcmp(f->d_name, "..") || !strcmp(f->d_name, ".rqt-tiles");
+    closedir(files);
+    if (is_empty) return SQLITE_OK;
+    return tiles_fail(error, "%s holds files that are not of rqt tiles: give another folder, or an empty one",
+                      folder);
+}
+
 /* Makes the folder ours: *file holds its lock. */
 static int claim_folder(const tiles_job *job, const char *description, int *file, char **error) {
     char path[MOST_PATH], there[1024] = "";
-    int code = make_folder(job->folder, error);
+    int code = make_path(job->folder, error);
     if (code != SQLITE_OK) return code;
     snprintf(path, sizeof path, "%s/.rqt-tiles", job->folder);
     *file = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0666);
@@ -287,8 +317,10 @@ static int claim_folder(const tiles_job *job, const char *description, int *file
     const size_t size = strlen(description);
     const ssize_t n = read(*file, there, sizeof there);
     if (n < 0) return fail_file(error, path);
-    if (n == 0) return write(*file, description, size) == (ssize_t)size ? SQLITE_OK : fail_file(error, path);
-    if ((size_t)n < size && memcmp(there, description, (size_t)n) == 0) /* killed at this very place */
+    if (n == 0) code = check_empty(job->folder, error);
+    if (code != SQLITE_OK) unlink(path);
+    if (code != SQLITE_OK) return code;
+    if ((size_t)n < size && memcmp(there, description, (size_t)n) == 0) /* new, or killed at this very place */
         return pwrite(*file, description, size, 0) == (ssize_t)size ? SQLITE_OK : fail_file(error, path);
     if ((size_t)n == size && memcmp(there, description, size) == 0) return SQLITE_OK;
     return tiles_fail(
@@ -302,7 +334,7 @@ static int write_document(tiles *t, const tiles_job *job, int last, char **error
     char path[MOST_PATH];
     tile_bytes document;
     snprintf(path, sizeof path, "%s/%s", job->folder, job->kind->document);
-    int code = tiles_document(t, "", job->first, last, &document, error);
+    int code = tiles_document(t, job->url ? job->url : "", job->first, last, &document, error);
     if (code == SQLITE_OK) code = write_file(path, document.bytes, document.size, error);
     sqlite3_free(document.bytes);
     return code;
@@ -315,6 +347,8 @@ static int write_all(pyramid *p, tiles *t, tiles_report *report, char **error) {
     p->last = job->last < finest ? job->last : finest;
     if (strlen(job->folder) > MOST_PATH - 64) return tiles_fail(error, "the folder's name is too long");
     if (job->first > p->last) return tiles_fail(error, "terrain %s has levels 0 to %d", t->terrain->name, finest);
+    if (job->url && !job->kind->has_addresses)
+        return tiles_fail(error, "%s needs no URL: its addresses are relative", job->kind->name);
     if (job->kind->is_whole && (job->first > 0 || p->last < finest))
         return tiles_fail(error, "%s has all levels, 0 to %d, or none", job->kind->name, finest);
     p->description = describe_job(job, t, p->last);

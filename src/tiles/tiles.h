@@ -42,6 +42,7 @@ typedef struct tile_kind {
     const char *name;     /* of its folder in the service's paths, and for people: "quantized-mesh" */
     const char *document; /* "layer.json"; application/json */
     bool is_whole;        /* levels are there all or not at all */
+    bool has_addresses;   /* clients want whole ones in the document */
     int series_count;
     tile_series series[MOST_SERIES];
     const struct tile_functions *functions;
@@ -76,12 +77,14 @@ int tiles_document(tiles *t, const char *root, int first, int last, tile_bytes *
 int tiles_make(tiles *t, int series, int z, int32_t x, int32_t y, tile_bytes *out, char **error);
 
 /* ------------------------------------------------------------------------------------------------- to disk -- */
+enum { MOST_WORKERS = 64 };
 typedef struct tiles_job {
     const tile_kind *kind;
     const char *database, *terrain, *folder;
     int first, last; /* levels; last beyond the finest: the finest */
+    const char *url; /* where the folder will be, with a slash at its end; NULL: addresses are relative */
     bool gzip;
-    int workers;
+    int workers; /* 1 .. MOST_WORKERS */
     /* A connection for a worker, with the SQL functions or without; NULL after a sentence of its own. */
     sqlite3 *(*connect)(void *context);
     /* So many tiles of so many are there; false stops (SQLITE_INTERRUPT). Called by one thread. May be NULL. */
@@ -94,7 +97,8 @@ typedef struct tiles_report {
     int finest;             /* level that was written last */
 } tiles_report;
 /* Writes the series, and at last the document, each file whole or not at all. A folder of the same
- * job that did not finish is gone on with; one of another terrain, state or of other options is refused. */
+ * job that did not finish is gone on with; one of another terrain, state or of other options is refused, and one
+ * with files that are not of a job. */
 int tiles_write(const tiles_job *job, tiles_report *report, char **error);
 
 #endif
