@@ -441,7 +441,7 @@ def check_levels(t, k):
     told, steps = t.set.json["extras"]["rqt"]["errors"], t.set.json["extras"]["rqt"]["steps"]
     em = [max([e for level, e in errors if level > l + k], default=0) for l in range(len(told) + 2)]
     cell = math.radians(max(t.dx, -t.dy)) * A
-    wanted = [0.5 + max(em[l + 2], min(max(em[l + 1], em[l] / 4), cell * 2**(len(told) - 1 - l) / 4)) + steps[l] * math.sqrt(3) / 2 for l in range(len(told) - 1)]
+    wanted = [0.5 + max(em[l + 2], min(em[l], cell * 2**(len(told) - 1 - l) / 4)) + steps[l] * math.sqrt(3) / 2 for l in range(len(told) - 1)]
     s.check(t.name + ": levels are off by what their vertices say", len(told) > 4 and max(abs(a - b) for a, b in zip(told, wanted)) < 1e-5, (told, wanted))
 
 

@@ -13,7 +13,7 @@ MUTANTS = [
     ("3d-tiles: a tile forgets its own errors", TILE, "rqt_code_metres(relief->error) + level->centre;", "level->centre;", TILES, "no sample is further"),
     ("3d-tiles: the last level leaves out what half a metre allows", MESH, ": tile.level == plan->finest ? error : sag;", ": sag;", TILES, "goes through every sample"),
     ("3d-tiles: every level states the first one's error", TILE, "block_plan_of(t)->level[tile.level];\n    const double own", "block_plan_of(t)->level[0];\n    const double own", TILES, "is not idle"),
-    ("3d-tiles: a level is off by what the one above is", PLAN, "fmax(em[l + FINER], own);", "fmax(em[l + FINER], own) * (l == 1 ? 8 : 1);", TILES, "no tile has a larger error"),
+    ("3d-tiles: a level is off by what the one above is", PLAN, "fmax(em[l + FINER], fmin(em[l], ground));", "fmax(em[l + FINER], fmin(em[l], ground)) * (l == 1 ? 8 : 1);", TILES, "no tile has a larger error"),
     ("3d-tiles: the root's error is its own", TILESET, "most = fmax(most, ldexp(", "most = fmax(most, ldexp(l > 0 ? 0 : 1, 0) * (", TILES, "halved level by level"),
     # seams
     ("3d-tiles: corners are not forced", MESH, "corner < 4 && status", "corner < 0 && status", TILES, "covers its cell"),
