@@ -89,7 +89,7 @@ static int probe(tiles *t, block_tile tile, bool *has, char **error) {
         code = begin_query(t, tile, part, &q);
         if (code == SQLITE_OK)
             code =
-                plan_has_triangle(t, q.region, block_plan_of(t)->level[tile.level].error, &q.options, has, error);
+                tiles_has_triangle(t, q.region, block_plan_of(t)->level[tile.level].error, &q.options, has, error);
         end_query(&q);
     }
     return code;
