@@ -203,7 +203,8 @@ test-threads: ## what runs on several threads, under ThreadSanitizer
 	@$(MAKE) --no-print-directory -j2 products
 	@$(MAKE) --no-print-directory -j2 BUILD=$(BUILD)/threads OPTIMIZE=-O1 WARNINGS=-w SANITIZE=-fsanitize=thread $(THREADED:%=$(BUILD)/threads/tests/%) $(BUILD)/threads/rqt
 	@BUILD=$(BUILD)/threads PROGRAMS="$(THREADED)" ./tests/run.sh programs
-	@TSAN_OPTIONS=suppressions=$(CURDIR)/tests/threads.supp RQT_HOSTILE_MIB=1024 RQT=$(CURDIR)/$(BUILD)/threads/rqt RQT_SO=$(CURDIR)/$(BUILD)/rqt.so ./tests/test_serve.sh quiet
+	@export TSAN_OPTIONS=suppressions=$(CURDIR)/tests/threads.supp RQT_HOSTILE_MIB=1024 RQT=$(CURDIR)/$(BUILD)/threads/rqt RQT_SO=$(CURDIR)/$(BUILD)/rqt.so; \
+	log=$(BUILD)/threads/test_tiles3d.log; ./tests/test_tiles3d.sh >$$log 2>&1 || { tail -n 60 $$log; exit 1; }; tail -n 1 $$log; ./tests/test_serve.sh quiet
 
 test-serve: ## the query service's tests, plain and under ASan and UBSan
 	@./src/install-packages.sh build test
