@@ -689,6 +689,7 @@ with open(outside, "w", encoding="utf-8") as f:
     f.write("mine")
 key = "%d/%d/%d.terrain" % max(COAST.tiles)
 os.makedirs(os.path.dirname(os.path.join(linked, key)))
+shutil.copy(COAST.folder + "/.rqt-tiles", linked)
 os.symlink(outside, os.path.join(linked, key + ".part"))
 other = "%d/%d/%d.terrain" % min(COAST.tiles)
 os.makedirs(os.path.dirname(os.path.join(linked, other)), exist_ok=True)
