@@ -53,8 +53,9 @@ int tiles_check_place(const store_terrain *t, char **error);
 /* Are its heights those above the ellipsoid, or above EGM96? Likewise. */
 int tiles_check_heights(const store_terrain *t, bool *is_above_geoid, char **error);
 geo_extent tiles_extent(const store_terrain *t);
-/* "attribution": where the terrain came from, in one line. Clients take it for HTML, which names of files are not.
- */
+/* Where the terrain came from, in one line, to be released with sqlite3_free; NULL: no memory. */
+char *tiles_attribution(const store_terrain *t);
+/* The same as "attribution" of a document. Clients take it for HTML, which names of files are not. */
 struct cJSON;
 void tiles_add_attribution(const store_terrain *t, struct cJSON *document);
 /* The document's text as the answer; releases it and the JSON. */

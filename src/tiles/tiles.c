@@ -80,12 +80,18 @@ geo_extent tiles_extent(const store_terrain *t) {
                         .highest = fmax(low, high)};
 }
 
+char *tiles_attribution(const store_terrain *t) {
+    char *text = sqlite3_mprintf("%s", t->source);
+    for (char *p = text; p && *p; p++)
+        if (*p == '\n') *p = p[1] ? ' ' : 0;
+    return text;
+}
+
 void tiles_add_attribution(const store_terrain *t, cJSON *document) {
+    char *line = tiles_attribution(t);
     sqlite3_str *text = sqlite3_str_new(NULL);
-    for (const char *p = t->source; *p; p++) {
-        if (*p == '\n')
-            sqlite3_str_appendall(text, p[1] ? " " : "");
-        else if (strchr("<>&\"'", *p))
+    for (const char *p = line; p && *p; p++) {
+        if (strchr("<>&\"'", *p))
             sqlite3_str_appendf(text, "&#%d;", *p);
         else
             sqlite3_str_appendchar(text, 1, *p);
@@ -93,6 +99,7 @@ void tiles_add_attribution(const store_terrain *t, cJSON *document) {
     char *all = sqlite3_str_finish(text);
     cJSON_AddStringToObject(document, "attribution", all ? all : "");
     sqlite3_free(all);
+    sqlite3_free(line);
 }
 
 int tiles_print(cJSON *document, tile_bytes *out) {
