@@ -297,6 +297,11 @@ s.equal("... as the client has named the host", addresses(Host="example.org:81")
 s.equal("... as a server before us says", addresses(X_Forwarded_Proto="https", X_Forwarded_Host="example.org, inner", X_Forwarded_Prefix="/dem/"),
         ["https://example.org/dem%s{z}/{x}/{y}.png" % root])
 s.equal("... but what is no host's name is none", addresses(Host='a"><b>'), ["{z}/{x}/{y}.png"])
+other = server.ask(root + "tile.json", headers={"X-Forwarded-Host": "example.org"})
+again = server.ask(root + "tile.json", headers={"If-None-Match": other.etag})
+s.check("... and what a store between us was told under one name is not what another name gets",
+        again.status == 200 and again.json()["tiles"] == addresses() and "X-Forwarded-Host" in (other.vary or ""), (other.etag, again.status, other.vary))
+s.equal("... while the same name is not told twice", server.ask(root + "tile.json", headers={"X-Forwarded-Host": "example.org", "If-None-Match": other.etag}).status, 304)
 told = server.ask(root + "tile.json").json()
 s.equal("all else is the command's", {**told, "tiles": 0}, {**ALPS.json, "tiles": 0})
 answer = server.ask("/collections/plane/tiles/terrarium/tile.json")

@@ -666,6 +666,52 @@ for name, edit, sentence in (("fill", "UPDATE rqt_fill_1 SET row = 100000 WHERE 
     out, status = s.run([s.RQT, "tiles", edited, "-o", folder])
     s.check("F55_an_edited_%s_is_a_sentence_and_no_layer_json" % name, status == 1 and sentence in out and not os.path.exists(folder + "/layer.json"), out)
 
+# Places, cells and heights that are none of the Earth's: a sentence, and no folder that takes for ever.
+for name, edit, kinds, sentence in (
+        ("longitude", "x0 = 1e300", ("quantized-mesh", "3d-tiles", "terrarium"), "it has longitudes beyond two turns of the Earth"),
+        ("turn", "x0 = -773094113099.0", ("quantized-mesh", "3d-tiles", "terrarium"), "it has longitudes beyond two turns of the Earth"),
+        ("cell", "dy = dy / 1e9", ("quantized-mesh", "3d-tiles", "terrarium"), "its cells are too small or too long"),
+        ("long_cell", "dy = dy / 2000", ("quantized-mesh", "3d-tiles", "terrarium"), "its cells are too small or too long"),
+        ("height", "height_offset = 1e300", ("quantized-mesh",), "are none of the Earth's")):
+    edited = s.temp(name + ".edited.gpkg")
+    shutil.copy(COAST.database, edited)
+    db = s.connect(edited)
+    db.execute("UPDATE rqt_terrain SET " + edit)
+    db.close()
+    for kind in kinds:
+        folder = s.temp("%s.%s.edited" % (name, kind))
+        out, status = s.run(["timeout", "60", s.RQT, "tiles", edited, "-o", folder, "--kind", kind])
+        s.check("F55_an_edited_%s_is_a_sentence: %s" % (name, kind), status == 1 and sentence in out and not os.path.exists(folder), out)
+
+# A folder in which somebody has put links: nothing outside of it is written to, and no link passes for a tile.
+linked, outside = s.temp("linked"), s.temp("outside")
+with open(outside, "w", encoding="utf-8") as f:
+    f.write("mine")
+key = "%d/%d/%d.terrain" % max(COAST.tiles)
+os.makedirs(os.path.dirname(os.path.join(linked, key)))
+shutil.copy(COAST.folder + "/.rqt-tiles", linked)
+os.symlink(outside, os.path.join(linked, key + ".part"))
+other = "%d/%d/%d.terrain" % min(COAST.tiles)
+os.makedirs(os.path.dirname(os.path.join(linked, other)), exist_ok=True)
+os.symlink(outside, os.path.join(linked, other))
+s.equal("links in the folder", s.run([s.RQT, "tiles", COAST.database, "-o", linked]), ("", 0))
+with open(outside, encoding="utf-8") as f:
+    s.equal("... are not written through", f.read(), "mine")
+s.equal("... and the folder is that without them", files(linked), whole)
+os.makedirs(s.temp("claimed"))
+os.symlink(s.temp("claimed.elsewhere"), s.temp("claimed") + "/.rqt-tiles")
+out, status = s.run([s.RQT, "tiles", COAST.database, "-o", s.temp("claimed")])
+s.check("... nor made through one", status == 1 and ".rqt-tiles" in out and not os.path.exists(s.temp("claimed.elsewhere")), out)
+
+# A database with a log: SQLite makes the log anew for whoever reads, without bytes.
+logged = s.temp("logged.gpkg")
+shutil.copy(COAST.database, logged)
+db = s.connect(logged, load=False)
+db.execute("PRAGMA journal_mode = WAL")
+db.close()
+for name in ("tiles of a database with a log", "... are gone on with by the same command"):
+    s.equal(name, s.run([s.RQT, "tiles", logged, "-o", s.temp("logged")]), ("", 0))
+
 # --------------------------------------------------------------------------------------------------------- the service
 
 server = service.Service(COAST.database, flat)

@@ -147,10 +147,12 @@ bool endpoint_represent(request *r, uint64_t state, const char *type, bool packe
     a->status = MHD_HTTP_OK;
     a->type = type;
     a->varies = by_accept ? (packed ? "Accept" : "Accept, Accept-Encoding") : packed ? NULL : "Accept-Encoding";
+    if (r->root) a->varies = "Accept-Encoding, Host, X-Forwarded-Host, X-Forwarded-Prefix, X-Forwarded-Proto";
     a->is_lasting = state != 0;
     if (!state) return true;
     /* What the answer is a function of: the program, the database, the request, and how it is packed. */
-    const uint64_t asked = add_text(add_text(add_text(0xCBF29CE484222325u, RQT_VERSION), r->target), type);
+    uint64_t asked = add_text(add_text(add_text(0xCBF29CE484222325u, RQT_VERSION), r->target), type);
+    if (r->root) asked = add_text(asked, r->root);
     snprintf(a->etag, sizeof a->etag, "\"%016llx-%016llx%s%s\"", (unsigned long long)state,
              (unsigned long long)asked, a->coding == CODING_IDENTITY ? "" : "-",
              a->coding == CODING_IDENTITY ? "" : coding_name(a->coding));

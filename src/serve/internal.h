@@ -93,7 +93,8 @@ typedef struct request {
     const char *method, *accept, *accept_encoding, *if_none_match; /* NULL: none */
     const endpoint *endpoint;                                      /* NULL: no such path */
     const char *terrain;                                           /* of the path */
-    double received;                                               /* seconds, monotonic */
+    const char *root; /* what whole addresses in the answer begin with; NULL: there are none */
+    double received;  /* seconds, monotonic */
     bool has_body;
     bool is_asked; /* counted as such */
     size_t held;   /* bytes of its answer on their way, counted too */

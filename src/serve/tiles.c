@@ -68,16 +68,9 @@ static char *find_root(const request *r) {
                            n > 0 && prefix[0] != '/' ? "/" : "", prefix, r->terrain, r->segments[KIND]);
 }
 
-static int make_document(tiles *t, const request *r, tile_bytes *out, char **error) {
-    char *root = find_root(r);
-    const int code = root ? tiles_document(t, root, 0, tiles_finest(t), out, error) : SQLITE_NOMEM;
-    sqlite3_free(root);
-    return code;
-}
-
 static int make(tiles *t, const request *r, int series, tile_bytes *out, char **error) {
     const char *const *place = r->segments + r->segment_count - 3;
-    if (series < 0) return make_document(t, r, out, error);
+    if (series < 0) return tiles_document(t, r->root, 0, tiles_finest(t), out, error);
     return tiles_make(t, series, atoi(place[0]), atoi(place[1]), atoi(place[2]), out, error);
 }
 
@@ -101,8 +94,17 @@ static void answer_series(worker *w, request *r, const tile_kind *kind, int seri
     terrain_end(&t);
 }
 
+/* Two clients that reach us by different names get different addresses: what one has is not told to be what the
+ * other would get (endpoint_represent). */
 void answer_tile_document(worker *w, request *r) {
-    answer_series(w, r, tiles_kind(r->segments[KIND]), -1);
+    char *root = find_root(r);
+    r->root = root;
+    if (root)
+        answer_series(w, r, tiles_kind(r->segments[KIND]), -1);
+    else
+        r->answer.body.no_memory = true;
+    r->root = NULL;
+    sqlite3_free(root);
 }
 
 void answer_tile(worker *w, request *r) {

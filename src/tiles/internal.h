@@ -55,8 +55,10 @@ int tiles_check_heights(const store_terrain *t, bool *is_above_geoid, char **err
 geo_extent tiles_extent(const store_terrain *t);
 /* Where the terrain came from, in one line, to be released with sqlite3_free; NULL: no memory. */
 char *tiles_attribution(const store_terrain *t);
-/* The document's text as the answer; releases it and the JSON. */
+/* The same as "attribution" of a document. Clients take it for HTML, which names of files are not. */
 struct cJSON;
+void tiles_add_attribution(const store_terrain *t, struct cJSON *document);
+/* The document's text as the answer; releases it and the JSON. */
 int tiles_print(struct cJSON *document, tile_bytes *out);
 /* Has the mesh of eps a triangle in a region? Looks no further than the first. */
 int tiles_has_triangle(tiles *t, const rqt_region *region, double eps, const store_query_options *options,

@@ -216,12 +216,6 @@ static void add_bounds(const store_terrain *t, cJSON *layer) {
     cJSON_AddItemToObject(layer, "bounds", cJSON_CreateDoubleArray(bounds, 4));
 }
 
-static void add_attribution(const store_terrain *t, cJSON *layer) {
-    char *text = tiles_attribution(t);
-    cJSON_AddStringToObject(layer, "attribution", text ? text : "");
-    sqlite3_free(text);
-}
-
 static cJSON *describe(const tiles *t, int first, int last) {
     const char *const templates[] = {"{z}/{x}/{y}.terrain"}, *const extensions[] = {"octvertexnormals", "metadata",
                                                                                     "watermask"};
@@ -239,7 +233,7 @@ static cJSON *describe(const tiles *t, int first, int last) {
     cJSON_AddNumberToObject(layer, "maxzoom", last);
     if (first == 0) cJSON_AddNumberToObject(layer, "metadataAvailability", last + 1);
     add_bounds(t->terrain, layer);
-    add_attribution(t->terrain, layer);
+    tiles_add_attribution(t->terrain, layer);
     /* For people: what clients take each level to be off, and the part that the mesh has of it. */
     for (int z = 0; z <= last; z++) {
         errors[z] = plan_of(t)->level[z].geometric_error;

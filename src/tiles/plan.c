@@ -82,7 +82,7 @@ static void set_heights(const store_terrain *t, tile_plan *plan) {
     plan->radius = CURVED + fmax(fabs(low), fabs(high)) + (plan->geoid ? GEOID_HIGHEST : 0);
 }
 
-static void set_levels(const store_terrain *t, tile_plan *plan) {
+static int set_levels(const store_terrain *t, tile_plan *plan, char **error) {
     const double sample = fmin(t->placement.dx, -t->placement.dy);
     const double quantum = fabs(rqt_unit_factor(&t->unit)) / t->unit.d;
     for (int z = 0; z < TILES_LEVELS; z++) {
@@ -98,6 +98,10 @@ static void set_levels(const store_terrain *t, tile_plan *plan) {
         level->eps = fmin(level->eps, quantum * LAST_EPS);
         break;
     }
+    /* So it is at all levels if it is at the first. */
+    if (plan->level[0].eps > 0) return SQLITE_OK;
+    return tiles_fail(error, "terrain %s has no tiles: its heights, %g to %g m, are none of the Earth's", t->name,
+                      plan->lowest, plan->lowest + TILE_UNITS * plan->step);
 }
 
 /* Voids: an eps as large as what is left of a terrain would leave no triangle of it, and clients who find nothing
@@ -137,8 +141,8 @@ int plan_create(tiles *t, void **out, char **error) {
     if (code == SQLITE_OK) code = seam_read(t, error);
     if (code == SQLITE_OK) {
         set_heights(terrain, plan);
-        set_levels(terrain, plan);
-        code = keep_ground(t, error);
+        code = set_levels(terrain, plan, error);
+        if (code == SQLITE_OK) code = keep_ground(t, error);
     }
     if (code == SQLITE_OK) code = seam_close(t, error);
     if (code == SQLITE_OK) code = water_read(t, plan, error);

@@ -23,7 +23,16 @@
 #include <unistd.h>
 #include <zlib.h>
 
+#define CHANGED "the database has changed meanwhile"
 enum { PIECE = 32, MOST_PATH = 4096, GZIP_LEVEL = 5, GZIP_WINDOW = 15 + 16, GZIP_MEMORY = 8 };
+
+/* A range of tiles. Its pieces, PIECE tiles of a row or what is left of it, are counted over all ranges, not
+ * listed: there may be more of them than memory. */
+typedef struct stretch {
+    int series, z;
+    tile_range range;
+    size_t first; /* number of its first piece */
+} stretch;
 
 /* Tiles x0..x1 of one row. */
 typedef struct piece {
@@ -35,8 +44,9 @@ typedef struct pyramid {
     const tiles_job *job;
     char *description; /* of what the tiles are */
     int last;
-    piece *pieces;
-    size_t count;
+    stretch *stretches;
+    size_t stretch_count;
+    size_t count; /* of pieces */
     atomic_size_t next;
     atomic_llong done, written, bytes;
     atomic_bool stop;
@@ -70,11 +80,12 @@ static int make_path(const char *folder, char **error) {
     return make_folder(path, error);
 }
 
-/* Whole or not at all. */
+/* Whole or not at all. What a kill has left is made anew, not written to: it could be a link to elsewhere. */
 static int write_file(const char *path, const void *bytes, size_t size, char **error) {
     char part[MOST_PATH + 8];
     snprintf(part, sizeof part, "%s.part", path);
-    FILE *f = fopen(part, "wb");
+    unlink(part);
+    FILE *f = fopen(part, "wxe");
     if (!f) return fail_file(error, part);
     const bool ok = fwrite(bytes, 1, size, f) == size && fflush(f) == 0;
     if (fclose(f) == 0 && ok && rename(part, path) == 0) return SQLITE_OK;
@@ -114,9 +125,10 @@ static char *describe_job(const tiles_job *job, const tiles *t, int last) {
     struct stat file = {0}, log = {0};
     char path[MOST_PATH];
     snprintf(path, sizeof path, "%s-wal", job->database);
-    if (stat(job->database, &file) || stat(path, &log)) log = (struct stat){0};
+    /* A log without bytes comes and goes with readers. */
+    if (stat(job->database, &file) || stat(path, &log) || log.st_size == 0) log = (struct stat){0};
     return sqlite3_mprintf(
-        "rqt %s\n%s of terrain %s of %s\ndatabase %lld bytes, %lld.%09ld s, log %lld bytes, %lld.%09ld s\n"
+        "rqt %s\n%s of terrain %s of %.64s\ndatabase %lld bytes, %lld.%09ld s, log %lld bytes, %lld.%09ld s\n"
         "levels %d to %d%s%s%s\n",
         RQT_VERSION, job->kind->name, t->terrain->name, t->terrain->created, (long long)file.st_size,
         (long long)file.st_mtim.tv_sec, (long)file.st_mtim.tv_nsec, (long long)log.st_size,
@@ -130,7 +142,7 @@ static int check_state(const pyramid *p, const tiles *t, char **error) {
     char *now = describe_job(p->job, t, p->last);
     const int code = !now                               ? SQLITE_NOMEM
                      : strcmp(now, p->description) == 0 ? SQLITE_OK
-                                                        : tiles_fail(error, "the database has changed meanwhile");
+                                                        : tiles_fail(error, CHANGED);
     sqlite3_free(now);
     return code;
 }
@@ -142,12 +154,15 @@ static int write_tile(pyramid *p, tiles *t, const piece *row, int32_t x, char **
     struct stat there;
     tile_bytes tile;
     const tile_series *series = &p->job->kind->series[row->series];
-    snprintf(path, sizeof path, "%s/%s%d/%d/%d%s", p->job->folder, series->folder, row->z, (int)x, (int)row->y,
-             series->suffix);
-    if (stat(path, &there) == 0) return SQLITE_OK;
+    const int folder = snprintf(path, sizeof path, "%s/%s%d/%d", p->job->folder, series->folder, row->z, (int)x);
+    snprintf(path + folder, sizeof path - (size_t)folder, "/%d%s", (int)row->y, series->suffix);
+    if (lstat(path, &there) == 0 && S_ISREG(there.st_mode)) return SQLITE_OK;
     int code = tiles_make(t, row->series, row->z, x, row->y, &tile, error);
     if (code == SQLITE_OK && tile.size > 0) {
         if (p->job->gzip && !series->is_packed) code = pack(&tile);
+        path[folder] = '\0';
+        if (code == SQLITE_OK) code = make_folder(path, error);
+        path[folder] = '/';
         if (code == SQLITE_OK) code = write_file(path, tile.bytes, tile.size, error);
         if (code == SQLITE_OK) {
             p->written++;
@@ -158,16 +173,38 @@ static int write_tile(pyramid *p, tiles *t, const piece *row, int32_t x, char **
     return code;
 }
 
+static piece find_piece(const pyramid *p, size_t n) {
+    size_t low = 0, high = p->stretch_count; /* the last one that begins at or before n */
+    while (high - low > 1) {
+        const size_t middle = low + (high - low) / 2;
+        if (p->stretches[middle].first <= n)
+            low = middle;
+        else
+            high = middle;
+    }
+    const stretch *of = &p->stretches[low];
+    const tile_range *r = &of->range;
+    const size_t in_row = ((size_t)(r->x1 - r->x0) + PIECE) / PIECE;
+    const int32_t x = r->x0 + PIECE * (int32_t)((n - of->first) % in_row);
+    return (piece){.series = of->series,
+                   .z = of->z,
+                   .y = r->y0 + (int32_t)((n - of->first) / in_row),
+                   .x0 = x,
+                   .x1 = r->x1 - x < PIECE ? r->x1 : x + PIECE - 1};
+}
+
 static int write_pieces(pyramid *p, tiles *t, char **error) {
     int code = tiles_begin(t, p->job->kind, p->job->terrain, error);
     if (code != SQLITE_OK) return code;
     tiles_tell(t, p->last);
     code = check_state(p, t, error);
-    for (size_t n; code == SQLITE_OK && (n = p->next++) < p->count;)
-        for (int32_t x = p->pieces[n].x0; x <= p->pieces[n].x1 && code == SQLITE_OK && !p->stop; x++) {
-            code = write_tile(p, t, &p->pieces[n], x, error);
+    for (size_t n; code == SQLITE_OK && !p->stop && (n = p->next++) < p->count;) {
+        const piece row = find_piece(p, n);
+        for (int32_t x = row.x0; x <= row.x1 && code == SQLITE_OK && !p->stop; x++) {
+            code = write_tile(p, t, &row, x, error);
             p->done++;
         }
+    }
     tiles_end(t);
     return code;
 }
@@ -237,32 +274,18 @@ static int run_workers(pyramid *p, int64_t all, char **error) {
 
 /* ----------------------------------------------------------------------------------------------------- whole -- */
 
-static int add_pieces(pyramid *p, int series, int z, const tile_range *r, size_t *capacity, int64_t *all) {
-    for (int32_t y = r->y0; y <= r->y1; y++)
-        for (int32_t x = r->x0; x <= r->x1; x += PIECE) {
-            if (p->count == *capacity) {
-                *capacity = *capacity ? 2 * *capacity : 256;
-                piece *more = sqlite3_realloc64(p->pieces, *capacity * sizeof *more);
-                if (!more) return SQLITE_NOMEM;
-                p->pieces = more;
-            }
-            const int32_t last = x + PIECE - 1 < r->x1 ? x + PIECE - 1 : r->x1;
-            p->pieces[p->count++] = (piece){series, z, y, x, last};
-            *all += last - x + 1;
-        }
-    return SQLITE_OK;
-}
-
-static int make_folders(const tiles_job *job, int series, int z, const tile_range *r, char **error) {
-    const char *folder = job->kind->series[series].folder;
-    char path[MOST_PATH];
-    snprintf(path, sizeof path, "%s/%s%d", job->folder, folder, z);
-    int code = make_folder(path, error);
-    for (int32_t x = r->x0; x <= r->x1 && code == SQLITE_OK; x++) {
-        snprintf(path, sizeof path, "%s/%s%d/%d", job->folder, folder, z, (int)x);
-        code = make_folder(path, error);
+static int add_stretch(pyramid *p, int series, int z, const tile_range *r, size_t *capacity, int64_t *all) {
+    const size_t rows = (size_t)(r->y1 - r->y0) + 1, columns = (size_t)(r->x1 - r->x0) + 1;
+    if (p->stretch_count == *capacity) {
+        *capacity = *capacity ? 2 * *capacity : 64;
+        stretch *more = sqlite3_realloc64(p->stretches, *capacity * sizeof *more);
+        if (!more) return SQLITE_NOMEM;
+        p->stretches = more;
     }
-    return code;
+    p->stretches[p->stretch_count++] = (stretch){series, z, *r, p->count};
+    p->count += rows * ((columns + PIECE - 1) / PIECE);
+    *all += (int64_t)(rows * columns);
+    return SQLITE_OK;
 }
 
 static int list_series(pyramid *p, tiles *t, int series, size_t *capacity, int64_t *all, char **error) {
@@ -273,16 +296,16 @@ static int list_series(pyramid *p, tiles *t, int series, size_t *capacity, int64
     for (int z = job->first; z <= p->last && code == SQLITE_OK; z++) {
         const tile_range *ranges;
         size_t count;
+        snprintf(path, sizeof path, "%s/%s%d", job->folder, job->kind->series[series].folder, z);
         code = tiles_available(t, series, z, &ranges, &count, error);
-        for (size_t i = 0; i < count && code == SQLITE_OK; i++) {
-            code = make_folders(job, series, z, &ranges[i], error);
-            if (code == SQLITE_OK) code = add_pieces(p, series, z, &ranges[i], capacity, all);
-        }
+        if (code == SQLITE_OK && count > 0) code = make_folder(path, error);
+        for (size_t i = 0; i < count && code == SQLITE_OK; i++)
+            code = add_stretch(p, series, z, &ranges[i], capacity, all);
     }
     return code;
 }
 
-static int list_pieces(pyramid *p, tiles *t, int64_t *all, char **error) {
+static int list_stretches(pyramid *p, tiles *t, int64_t *all, char **error) {
     size_t capacity = 0;
     int code = SQLITE_OK;
     for (int series = 0; series < p->job->kind->series_count && code == SQLITE_OK; series++)
@@ -306,15 +329,16 @@ static int check_empty(const char *folder, char **error) {
 
 /* Makes the folder ours: *file holds its lock. */
 static int claim_folder(const tiles_job *job, const char *description, int *file, char **error) {
-    char path[MOST_PATH], there[1024] = "";
+    char path[MOST_PATH], there[MOST_PATH] = "";
     int code = make_path(job->folder, error);
     if (code != SQLITE_OK) return code;
     snprintf(path, sizeof path, "%s/.rqt-tiles", job->folder);
-    *file = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+    *file = open(path, O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0666);
     if (*file < 0) return fail_file(error, path);
     if (flock(*file, LOCK_EX | LOCK_NB))
         return tiles_fail(error, "%s: another rqt tiles is at work there", job->folder);
     const size_t size = strlen(description);
+    if (size >= sizeof there) return tiles_fail(error, "the address of the tiles is too long");
     const ssize_t n = read(*file, there, sizeof there);
     if (n < 0) return fail_file(error, path);
     if (n == 0) code = check_empty(job->folder, error);
@@ -340,6 +364,15 @@ static int write_document(tiles *t, const tiles_job *job, int last, char **error
     return code;
 }
 
+/* t may have begun to read before a commit that the description knows of. Now it begins after it. */
+static int begin_again(const pyramid *p, tiles *t, int finest, char **error) {
+    tiles_end(t);
+    int code = tiles_begin(t, p->job->kind, p->job->terrain, error);
+    if (code != SQLITE_OK) return code;
+    code = check_state(p, t, error);
+    return code == SQLITE_OK && tiles_finest(t) != finest ? tiles_fail(error, CHANGED) : code;
+}
+
 static int write_all(pyramid *p, tiles *t, tiles_report *report, char **error) {
     const tiles_job *job = p->job;
     int file = -1;
@@ -352,15 +385,16 @@ static int write_all(pyramid *p, tiles *t, tiles_report *report, char **error) {
     if (job->kind->is_whole && (job->first > 0 || p->last < finest))
         return tiles_fail(error, "%s has all levels, 0 to %d, or none", job->kind->name, finest);
     p->description = describe_job(job, t, p->last);
-    int code = p->description ? claim_folder(job, p->description, &file, error) : SQLITE_NOMEM;
-    if (code == SQLITE_OK) code = list_pieces(p, t, &report->tiles, error);
+    int code = p->description ? begin_again(p, t, finest, error) : SQLITE_NOMEM;
+    if (code == SQLITE_OK) code = claim_folder(job, p->description, &file, error);
+    if (code == SQLITE_OK) code = list_stretches(p, t, &report->tiles, error);
     if (code == SQLITE_OK) code = run_workers(p, report->tiles, error);
     if (code == SQLITE_OK) code = write_document(t, job, p->last, error);
     report->written = p->written;
     report->bytes = p->bytes;
     report->finest = p->last;
     if (file >= 0) close(file);
-    sqlite3_free(p->pieces);
+    sqlite3_free(p->stretches);
     sqlite3_free(p->description);
     return code;
 }

@@ -39,6 +39,21 @@ static double latitude_of(int z, int32_t y) {
     return atan(sinh(M_PI * (1 - 2 * y / ldexp(1, z)))) / DEGREE;
 }
 
+/* Rows of a level lie between lines 0 .. 2^z, from the north: the first line that is south of a latitude, or on it
+ * if that counts; 2^z + 1: none. */
+static int32_t find_line(int z, double latitude, bool counts) {
+    int32_t low = 0, high = (1 << z) + 1;
+    while (low < high) {
+        const int32_t middle = low + (high - low) / 2;
+        const double there = latitude_of(z, middle);
+        if (there < latitude || (counts && there == latitude))
+            high = middle;
+        else
+            low = middle + 1;
+    }
+    return low;
+}
+
 static int32_t clamp_tile(double n, int z) {
     const double count = ldexp(1, z);
     return (int32_t)(n < 0 ? 0 : n > count - 1 ? count - 1 : n);
@@ -51,9 +66,9 @@ static int find_ranges(const store_terrain *t, int z, tile_range ranges[MOST_TUR
     int count = 0;
     tile_range next = {0};
     if (t->lattice.width < 2 || t->lattice.height < 2) return 0;
-    next.y1 = (1 << z) - 1;
-    while (next.y0 <= next.y1 && latitude_of(z, next.y0 + 1) >= e.north) next.y0++;
-    while (next.y1 >= next.y0 && latitude_of(z, next.y1) <= e.south) next.y1--;
+    const int32_t north = find_line(z, e.north, false), south = find_line(z, e.south, true);
+    next.y0 = north > 0 ? north - 1 : 0;
+    next.y1 = south > 1 << z ? (1 << z) - 1 : south - 1;
     if (next.y0 > next.y1) return 0;
     const int first = (int)floor((e.west - 180) / 360), last = (int)ceil((e.east + 180) / 360);
     for (int turn = last; turn >= first && count < MOST_TURNS; turn--) {
@@ -139,22 +154,6 @@ static void add_bounds(const store_terrain *t, cJSON *document) {
     cJSON_AddItemToObject(document, "bounds", cJSON_CreateDoubleArray(bounds, 4));
 }
 
-/* Where the terrain came from, in one line: clients take it for HTML, which names of files are not. */
-static void add_attribution(const store_terrain *t, cJSON *document) {
-    sqlite3_str *text = sqlite3_str_new(NULL);
-    for (const char *p = t->source; *p; p++) {
-        if (*p == '\n')
-            sqlite3_str_appendall(text, p[1] ? " " : "");
-        else if (strchr("<>&\"'", *p))
-            sqlite3_str_appendf(text, "&#%d;", *p);
-        else
-            sqlite3_str_appendchar(text, 1, *p);
-    }
-    char *all = sqlite3_str_finish(text);
-    cJSON_AddStringToObject(document, "attribution", all ? all : "");
-    sqlite3_free(all);
-}
-
 static int document(tiles *t, const char *root, int first, int last, tile_bytes *out, char **error) {
     char *address = sqlite3_mprintf("%s{z}/{x}/{y}.png", root);
     const char *const addresses[] = {address};
@@ -169,7 +168,7 @@ static int document(tiles *t, const char *root, int first, int last, tile_bytes 
     cJSON_AddNumberToObject(json, "minzoom", first);
     cJSON_AddNumberToObject(json, "maxzoom", last);
     add_bounds(t->terrain, json);
-    add_attribution(t->terrain, json);
+    tiles_add_attribution(t->terrain, json);
     cJSON_AddStringToObject(json, "encoding", "terrarium");
     cJSON_AddNumberToObject(json, "tileSize", PIXELS);
     /* For people: what pixels are, and what is told of them. */

@@ -33,12 +33,24 @@ int tiles_fail_database(char **error, sqlite3 *db, int code) {
     return failed == SQLITE_NOMEM ? failed : code;
 }
 
+#define LEAST_CELL 1e-9 /* degrees; a tenth of a millimetre */
+#define MOST_RATIO 1024.0
 int tiles_check_place(const store_terrain *t, char **error) {
     const double most = 1 + 1e-9; /* a rounding */
     const geo_extent e = tiles_extent(t);
     if (!t->lonlat || !t->wgs84 || t->placement.dx <= 0 || t->placement.dy >= 0)
         return tiles_fail(
             error, "terrain %s has no tiles: they are of terrains in longitude and latitude on WGS 84", t->name);
+    /* A longitude may be told with a turn too many, and no more: doubles far out have no digits left. */
+    if (fabs(e.west) > 720 || fabs(e.east) > 720)
+        return tiles_fail(error, "terrain %s has no tiles: it has longitudes beyond two turns of the Earth",
+                          t->name);
+    /* Tiles are square: their number would go by the shorter side of cells, and not by how many samples there are.
+     */
+    if (fmin(e.lon_step, e.lat_step) < LEAST_CELL || e.lon_step > MOST_RATIO * e.lat_step ||
+        e.lat_step > MOST_RATIO * e.lon_step)
+        return tiles_fail(error, "terrain %s has no tiles: its cells are too small or too long, %g by %g degrees",
+                          t->name, e.lon_step, e.lat_step);
     if (e.east - e.west > 360 * most)
         return tiles_fail(error, "terrain %s has no tiles: it goes around the Earth more than once", t->name);
     if (e.north > 90 * most || e.south < -90 * most)
@@ -73,6 +85,21 @@ char *tiles_attribution(const store_terrain *t) {
     for (char *p = text; p && *p; p++)
         if (*p == '\n') *p = p[1] ? ' ' : 0;
     return text;
+}
+
+void tiles_add_attribution(const store_terrain *t, cJSON *document) {
+    char *line = tiles_attribution(t);
+    sqlite3_str *text = sqlite3_str_new(NULL);
+    for (const char *p = line; p && *p; p++) {
+        if (strchr("<>&\"'", *p))
+            sqlite3_str_appendf(text, "&#%d;", *p);
+        else
+            sqlite3_str_appendchar(text, 1, *p);
+    }
+    char *all = sqlite3_str_finish(text);
+    cJSON_AddStringToObject(document, "attribution", all ? all : "");
+    sqlite3_free(all);
+    sqlite3_free(line);
 }
 
 int tiles_print(cJSON *document, tile_bytes *out) {
