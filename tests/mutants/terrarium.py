@@ -10,7 +10,6 @@ MUTANTS = [
     ("terrarium: the smallest bound gives way first", PROOF, "p->parts[(at - 1) / 2].bound < new.bound;", "p->parts[(at - 1) / 2].bound > new.bound;", TERRARIUM, "the stated error holds"),
     ("terrarium: boxes never give way to their children", PROOF, "MOST_SPLITS = 1200", "MOST_SPLITS = 0", TERRARIUM, "times the true one"),
     ("terrarium: one child is not looked at", PROOF, "for (int c = 0; c < 4 && code == SQLITE_OK; c++) {", "for (int c = 0; c < 3 && code == SQLITE_OK; c++) {", TERRARIUM, "the stated error holds"),
-    ("terrarium: vertices in leaves are their western neighbours", LATTICE, "l->metres[before] + share_after * (l->metres[after] - l->metres[before]);", "l->metres[before];", TERRARIUM, "the stated error holds"),
     ("terrarium: all samples are not measured", SAMPLES, "if (off > most) most = off;", "if (off > most && y % 2) most = off;", TERRARIUM, "the stated error holds"),
     ("terrarium: rows of pixels are even in latitude", SAMPLES, "const double n = (top - next) / (2 * M_PI) * ldexp(PIXELS, g->z);",
      "const double n = (g->lat[0] - lat) / (g->lat[0] - g->lat[GRID - 1]) * (GRID - 1) + 0 * (top - next);", TERRARIUM, "the stated error holds"),
@@ -28,7 +27,7 @@ MUTANTS = [
     ("terrarium: rows are counted from the south", KIND, "y >= r->y0 && y <= r->y1;", "(1 << z) - 1 - y >= r->y0 && (1 << z) - 1 - y <= r->y1;", TERRARIUM, "meet the raster"),
     ("terrarium: all of the world is there", KIND, "if (!is_there) return SQLITE_OK;", "", TERRARIUM, "are not there"),
     ("terrarium: voids are not counted", PNG, "count += g->code[j * GRID + i] == NO_HEIGHT;", "count += 0;", TERRARIUM, "void pixels are counted"),
-    ("terrarium: names of files are HTML", KIND, "else if (strchr(\"<>&\\\"'\", *p))", "else if (*p == 1)", TERRARIUM, "no HTML"),
+    ("terrarium: names of files are HTML", "src/tiles/tiles.c", "if (strchr(\"<>&\\\"'\", *p))", "if (*p == 1)", TERRARIUM, "no HTML"),
     # addresses
     ("terrarium: any host will do", SERVE, "if (!isalnum((unsigned char)given[i]) && !strchr(others, given[i])) return;", "if (given[i] == 1) return;", TERRARIUM, "no host's name"),
     ("terrarium: servers before us name no folder", SERVE, 'read_header(r, "X-Forwarded-Prefix", "-._~/", prefix);', "prefix[0] = 0;", TERRARIUM, "as a server before us says"),
