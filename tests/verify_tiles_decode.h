@@ -83,6 +83,7 @@ class Decoder {
         read_vertices();
         if (tile.problem.empty()) read_triangles();
         if (tile.problem.empty()) read_extensions();
+        if (tile.problem.empty()) drop_specks();
     }
     Tile tile;
 
@@ -143,6 +144,16 @@ class Decoder {
         for (std::vector<int> *list : {&tile.u, &tile.v, &tile.h}) read_differences(*list, n);
         wide = n > 65536 ? 4 : 2;
         at += (wide - at % wide) % wide;
+    }
+    /* Where it has no terrain a tile has triangles of one vertex, behind all others: nothing is to be seen of them. */
+    void drop_specks() {
+        std::vector<uint32_t> &t = tile.triangles;
+        while (t.size() >= 3 && t[t.size() - 3] == t.back() && t[t.size() - 2] == t.back() &&
+               t.back() + 1 == tile.count()) {
+            t.resize(t.size() - 3);
+            for (std::vector<int> *list : {&tile.u, &tile.v, &tile.h}) list->pop_back();
+            tile.normals.resize(tile.normals.size() < 2 ? 0 : tile.normals.size() - 2);
+        }
     }
     void read_triangles() {
         const uint64_t n = 3 * (uint64_t)take<uint32_t>();
