@@ -83,7 +83,6 @@ class Decoder {
         read_vertices();
         if (tile.problem.empty()) read_triangles();
         if (tile.problem.empty()) read_extensions();
-        if (tile.problem.empty()) drop_specks();
     }
     Tile tile;
 
@@ -152,7 +151,7 @@ class Decoder {
                t.back() + 1 == tile.count()) {
             t.resize(t.size() - 3);
             for (std::vector<int> *list : {&tile.u, &tile.v, &tile.h}) list->pop_back();
-            tile.normals.resize(tile.normals.size() < 2 ? 0 : tile.normals.size() - 2);
+            if (tile.normals.size() >= 2) tile.normals.resize(tile.normals.size() - 2);
         }
     }
     void read_triangles() {
@@ -189,6 +188,7 @@ class Decoder {
             if (id == 4) read_metadata(body);
         }
         if (tile.normals.size() != 2 * tile.count()) fail("normals for another number of vertices");
+        drop_specks();
         if (!tile.water.empty() && tile.water.size() != 1 && tile.water.size() != 65536)
             fail("a water mask of " + std::to_string(tile.water.size()) + " bytes");
         for (double d : {tile.geometric_error, tile.step})
