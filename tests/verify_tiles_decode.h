@@ -144,7 +144,8 @@ class Decoder {
         wide = n > 65536 ? 4 : 2;
         at += (wide - at % wide) % wide;
     }
-    /* Where it has no terrain a tile has triangles of one vertex, behind all others: nothing is to be seen of them. */
+    /* Where it has no terrain a tile has triangles of one vertex, behind all others: nothing is to be seen of them.
+     */
     void drop_specks() {
         std::vector<uint32_t> &t = tile.triangles;
         while (t.size() >= 3 && t[t.size() - 3] == t.back() && t[t.size() - 2] == t.back() &&
