@@ -197,13 +197,14 @@ coverage: ## the test programs in a build that counts: the core's lines, 100 % b
 # What runs on several threads: readers beside a writer, the import's reader and workers, which work on sweeps and builds;
 # and the query service's workers.
 THREADED = test_fault_threads
-.PHONY: test-threads test-serve test-web
+.PHONY: test-threads test-serve test-tiles test-web
 test-threads: ## what runs on several threads, under ThreadSanitizer
 	@./src/install-packages.sh build test
 	@$(MAKE) --no-print-directory -j2 products
 	@$(MAKE) --no-print-directory -j2 BUILD=$(BUILD)/threads OPTIMIZE=-O1 WARNINGS=-w SANITIZE=-fsanitize=thread $(THREADED:%=$(BUILD)/threads/tests/%) $(BUILD)/threads/rqt
 	@BUILD=$(BUILD)/threads PROGRAMS="$(THREADED)" ./tests/run.sh programs
-	@TSAN_OPTIONS=suppressions=$(CURDIR)/tests/threads.supp RQT_HOSTILE_MIB=1024 RQT=$(CURDIR)/$(BUILD)/threads/rqt RQT_SO=$(CURDIR)/$(BUILD)/rqt.so ./tests/test_serve.sh quiet
+	@export TSAN_OPTIONS=suppressions=$(CURDIR)/tests/threads.supp RQT_HOSTILE_MIB=1024 RQT=$(CURDIR)/$(BUILD)/threads/rqt RQT_SO=$(CURDIR)/$(BUILD)/rqt.so; \
+	log=$(BUILD)/threads/test_tiles3d.log; ./tests/test_tiles3d.sh >$$log 2>&1 || { tail -n 60 $$log; exit 1; }; tail -n 1 $$log; ./tests/test_serve.sh quiet
 
 test-serve: ## the query service's tests, plain and under ASan and UBSan
 	@./src/install-packages.sh build test
@@ -212,6 +213,14 @@ test-serve: ## the query service's tests, plain and under ASan and UBSan
 	  SANITIZE="-fsanitize=address,undefined -fno-sanitize-recover=undefined" $(BUILD)/sanitized/rqt
 	@RQT=$(CURDIR)/$(BUILD)/rqt RQT_SO=$(CURDIR)/$(BUILD)/rqt.so ./tests/test_serve.sh quiet
 	@ASAN_OPTIONS=detect_leaks=1 LSAN_OPTIONS=suppressions=$(CURDIR)/tests/leaks.supp:print_suppressions=0 RQT_HOSTILE_MIB=1024 RQT=$(CURDIR)/$(BUILD)/sanitized/rqt RQT_SO=$(CURDIR)/$(BUILD)/rqt.so ./tests/test_serve.sh quiet
+
+test-tiles: ## the tests of tiles for globes and maps under ASan and UBSan
+	@./src/install-packages.sh build test
+	@$(MAKE) --no-print-directory -j2 products
+	@$(MAKE) --no-print-directory -j2 BUILD=$(BUILD)/sanitized OPTIMIZE=-O1 \
+	  SANITIZE="-fsanitize=address,undefined -fno-sanitize-recover=undefined" $(BUILD)/sanitized/rqt
+	@export ASAN_OPTIONS=detect_leaks=1 LSAN_OPTIONS=suppressions=$(CURDIR)/tests/leaks.supp:print_suppressions=0 RQT=$(CURDIR)/$(BUILD)/sanitized/rqt RQT_SO=$(CURDIR)/$(BUILD)/rqt.so; \
+	for kind in tiles tiles3d terrarium; do log=$(BUILD)/sanitized/test_$$kind.log; ./tests/test_$$kind.sh >$$log 2>&1 || { tail -n 60 $$log; exit 1; }; tail -n 1 $$log; done
 
 test-web: ## the page in headless Chromium, and its modules in node; pictures in build/web-shots
 	@./src/install-packages.sh build test web browser

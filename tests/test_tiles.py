@@ -4,6 +4,7 @@ The decoder is written from the format's description (CesiumGS/quantized-mesh), 
 the places in space are computed here: nothing is asked of the program but tiles.
 """
 import bisect
+import fcntl
 import gzip
 import itertools
 import json
@@ -563,6 +564,14 @@ TALL = pyramid("tall", s.write_grid(s.temp("tall.asc"), tall, 30.01, 44.02, 1 / 
 s.equal("tall: layer.json lists the same tiles", sorted(listed(TALL.layer)), sorted([*TALL.tiles, *TALL.empty]))
 listed_exactly(TALL, False)
 
+# Heights rounded to steps that are larger than what clients take the finest tiles to be off: levels end before those.
+steps = s.rough_grid(70, 60, 13, relief=300)
+STEPS = pyramid("steps", s.write_grid(s.temp("steps.asc"), [[z + 0.25 for z in row] for row in steps], 7.0306, 46.4058, 1 / 50000, s.WGS84),
+                [[z + 0.25 for z in row] for row in steps], quantum=10)
+check_pyramid(STEPS, True)
+last = STEPS.layer["geometricErrors"]
+s.check("steps: levels end where 5 m of rounding would be more than clients take them to be off", 5 < last[-1] < 2 * 5.2, last[-2:])
+
 # Longitudes beyond 180: the same places by another name.
 hill = s.rough_grid(90, 70, 11, relief=500)
 NEAR = pyramid("near", s.write_grid(s.temp("near.asc"), hill, -1.5, 50.25, 1 / 64, s.WGS84), hill)
@@ -647,10 +656,17 @@ before = os.stat(os.path.join(again, kept)).st_ino
 s.equal("the same command goes on there", s.run(command + ["--jobs", "2"]), ("", 0))
 s.equal("... and the folder is that of one that was not killed, byte for byte", files(again), whole)
 s.equal("... without making again what was there", os.stat(os.path.join(again, kept)).st_ino, before)
+with open(again + "/.rqt-tiles", "rb") as held:
+    fcntl.flock(held, fcntl.LOCK_EX)
+    out, status = s.run(command)
+s.check("... by one command at a time", status == 1 and "another rqt tiles is at work there" in out, out)
 out, status = s.run([s.RQT, "tiles", ALPS.database, "-o", again])
 s.check("tiles of another terrain are not mixed in", status == 1 and "holds tiles of another terrain" in out, out)
 out, status = s.run(command + ["--gzip"])
 s.check("... nor compressed ones", status == 1 and "holds tiles of another terrain" in out, out)
+os.remove(os.path.join(again, ".rqt-tiles"))
+out, status = s.run(command)
+s.check("... nor into a folder that says nothing of its files", status == 1 and "holds files that are not of rqt tiles" in out and not os.path.exists(again + "/.rqt-tiles"), out)
 packed = s.temp("packed")
 s.equal("--gzip", s.run([s.RQT, "tiles", COAST.database, "-o", packed, "--gzip", "--levels", "3-9"]), ("", 0))
 s.equal("... has the same tiles, compressed", {path: gzip.decompress(data) for path, data in files(packed).items() if path.endswith(".terrain")},

@@ -6,15 +6,20 @@
  *
  * What is looked at (`promise` names it in the output; one broken promise makes the exit status 1):
  *
- *     space     no sample is further from the tile's flat triangles in space than the tile states (metadata
- * "error") height    ... or further above or below a triangle that covers it ("verticalError") cover     every
- * sample of the terrain's mesh is covered; voids move the outline by the stated error on the ground (outline
- * `tol`), quantisation by a unit of the tile's 32767 edges     neighbours have the same vertices and normals on the
- * side that they share, corners too. Where voids end at the side only one of them may have ground: then no vertex
- * of it lies on an edge of the other children  what a tile covers its children cover: samples; and the quarter's
- * area, exactly inside header    sphere, horizon point (thousands of cameras about where the tile sinks below it),
- * heights, lists of sides normals   within a degree of the raster's central differences in space, which is what 2 x
- * 8 bits can say water     the mask is the sea listed    layer.json lists the files that there are
+ *     space     no sample is further from the tile's flat triangles in space than the tile states ("error" of
+ *               its metadata)
+ *     height    ... or further above or below a triangle that covers it ("verticalError")
+ *     cover     every sample of the terrain's mesh is covered; voids move the outline by the stated error on the
+ *               ground (outline `tol`), quantisation by a unit of the tile's 32767
+ *     edges     neighbours have the same vertices and normals on the side that they share, corners too. Where
+ *               voids end at the side only one of them may have ground: then no vertex of it lies on an edge of
+ *               the other
+ *     children  what a tile covers its children cover: samples; and the quarter's area, exactly inside
+ *     header    sphere, horizon point (thousands of cameras about where the tile sinks below it), heights, lists
+ *               of sides
+ *     normals   within a degree of the raster's central differences in space, which is what 2 x 8 bits can say
+ *     water     the mask is the sea
+ *     listed    layer.json lists the files that there are
  *
  * A table with a line a level goes to stdout.
  */

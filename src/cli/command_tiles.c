@@ -25,8 +25,8 @@ static const char HELP[] =
     "  --kind K             of the kinds above (default: quantized-mesh)\n"
     "  --terrain T          of several terrains\n"
     "  --levels A-B         levels A to B, or one (default: all, to the first with the resolution of the raster)\n"
-    "  --gzip               tiles compressed, to be served with Content-Encoding: gzip\n"
-    "  --jobs J             workers (default: one for each processor)\n"
+    "  --gzip               tiles compressed, to be served with Content-Encoding: gzip; PNG stay as they are\n"
+    "  --jobs J             workers, 1 to 64 (default: one for each processor)\n"
     "  --help               this text\n"
     "\n"
     "Examples:\n"
@@ -94,7 +94,9 @@ static int run(int argc, char **argv) {
     const long processors = sysconf(_SC_NPROCESSORS_ONLN);
     tiles_job job = {.kind = tile_kinds[0],
                      .last = TILES_LEVELS - 1,
-                     .workers = processors > 0 && processors <= 64 ? (int)processors : 1,
+                     .workers = processors < 1              ? 1
+                                : processors > MOST_WORKERS ? MOST_WORKERS
+                                                            : (int)processors,
                      .connect = connect,
                      .progress = show};
     for (int option; (option = cli_option(argc, argv, "o:h", OPTIONS)) != -1;) {
@@ -118,7 +120,8 @@ static int run(int argc, char **argv) {
             job.gzip = true;
             break;
         case 'j':
-            if (!cli_integer(optarg, 1, 64, &n)) return cli_usage("--jobs %s: a whole number from 1 to 64", optarg);
+            if (!cli_integer(optarg, 1, MOST_WORKERS, &n))
+                return cli_usage("--jobs %s: a whole number from 1 to %d", optarg, MOST_WORKERS);
             job.workers = (int)n;
             break;
         case 'h':

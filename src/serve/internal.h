@@ -9,7 +9,7 @@
  *   query.c      parameters as what SQL statements are bound to
  *   meshes.c     range, view, delta
  *   tables.c     height, profile, verify, explain, area
- *   globe.c      tiles for globes
+ *   tiles.c      tiles for globes and maps
  *   documents.c  landing page, conformance, collections
  *   page.c       the files of web/, compiled in, gzipped
  *   answer.c     bytes, problems (RFC 9457), rows as JSON

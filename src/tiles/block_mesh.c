@@ -84,7 +84,7 @@ int block_has_triangle(tiles *t, block_tile tile, int32_t part, bool *has, char 
     *has = false;
     int code = begin_query(t, tile, part, &q);
     if (code == SQLITE_OK)
-        code = plan_has_triangle(t, q.region, block_plan_of(t)->level[tile.level].error, &q.options, has, error);
+        code = tiles_has_triangle(t, q.region, block_plan_of(t)->level[tile.level].error, &q.options, has, error);
     end_query(&q);
     return code;
 }

@@ -10,7 +10,7 @@
  * The cut has its vertices in the order of the triangles: each new one is the next, which is what the high-water
  * mark wants. Specks follow (speck.c).
  */
-#include "internal.h"
+#include "quantized_mesh.h"
 
 #include "format.h"
 

@@ -17,7 +17,7 @@
  * geocentric; between samples, where a side cuts a triangle, they are the mean of the four around by nearness. What
  * neighbours share depends on the place alone. Specks have the ellipsoid's.
  */
-#include "internal.h"
+#include "quantized_mesh.h"
 
 #include <math.h>
 #include <string.h>

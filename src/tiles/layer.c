@@ -12,33 +12,27 @@
  * after so many levels a tile tells of those below it. Here that is one more than there are, so that it is the
  * tiles of level 0 that do, of all levels (encode.c). Clients that go by "available" find the same there.
  */
-#include "internal.h"
+#include "quantized_mesh.h"
 
 #include <cjson/cJSON.h>
 #include <math.h>
 #include <string.h>
 
-typedef struct range_list {
-    tile_range *items;
-    size_t count, capacity, row; /* row: where those that ended with the row before begin */
-} range_list;
+/* Ranges of a level, from the south on. */
+typedef struct row_list {
+    range_list all;
+    size_t row; /* where those that ended with the row before begin */
+} row_list;
 
-static int add_range(range_list *list, tile_range range) {
-    for (size_t i = list->row; i < list->count; i++) {
-        tile_range *r = &list->items[i];
+/* One range with that of the row before, if that has the same columns. */
+static int add_range(row_list *list, tile_range range) {
+    for (size_t i = list->row; i < list->all.count; i++) {
+        tile_range *r = &list->all.items[i];
         if (r->y1 != range.y0 - 1 || r->x0 != range.x0 || r->x1 != range.x1) continue;
         r->y1 = range.y1;
         return SQLITE_OK;
     }
-    if (list->count == list->capacity) {
-        const size_t capacity = list->capacity ? 2 * list->capacity : 16;
-        tile_range *items = sqlite3_realloc64(list->items, capacity * sizeof *items);
-        if (!items) return SQLITE_NOMEM;
-        list->items = items;
-        list->capacity = capacity;
-    }
-    list->items[list->count++] = range;
-    return SQLITE_OK;
+    return tiles_add_range(&list->all, range);
 }
 
 /* Has the tile a triangle? */
@@ -49,7 +43,8 @@ static int probe(tiles *t, int z, int32_t x, int32_t y, bool *is_there, char **e
     *is_there = false;
     if (!plan_place(t, z, x, y, &place) || place.turns == 0) return SQLITE_OK;
     int code = plan_region(t, &place, &region);
-    if (code == SQLITE_OK) code = plan_has_triangle(t, region, plan_of(t)->level[z].eps, &options, is_there, error);
+    if (code == SQLITE_OK)
+        code = tiles_has_triangle(t, region, plan_of(t)->level[z].eps, &options, is_there, error);
     rqt_region_free(region);
     return code;
 }
@@ -99,7 +94,7 @@ static int ask_square(tiles *t, int z, const tile_range *r, band *b, char **erro
     return code;
 }
 
-static int add_row(const band *b, int32_t y, range_list *list) {
+static int add_row(const band *b, int32_t y, row_list *list) {
     const bool *row = b->is_there + (size_t)(y - b->y0) * b->width;
     int code = SQLITE_OK;
     for (size_t i = 0, end; i < b->width && code == SQLITE_OK; i = end) {
@@ -110,7 +105,7 @@ static int add_row(const band *b, int32_t y, range_list *list) {
 }
 
 /* The tiles of rows that are there, of the ranges that overlap the raster. */
-static int add_band(tiles *t, int z, const tile_range *all, int n, int32_t y0, int32_t y1, range_list *list,
+static int add_band(tiles *t, int z, const tile_range *all, int n, int32_t y0, int32_t y1, row_list *list,
                     char **error) {
     band bands[MOST_TURNS] = {{0}};
     int code = SQLITE_OK;
@@ -125,9 +120,9 @@ static int add_band(tiles *t, int z, const tile_range *all, int n, int32_t y0, i
         }
     }
     for (int32_t y = y0; y <= y1 && code == SQLITE_OK; y++) {
-        const size_t before = list->count;
+        const size_t before = list->all.count;
         for (int i = 0; i < n && code == SQLITE_OK; i++) code = add_row(&bands[i], y, list);
-        while (list->row < before && list->items[list->row].y1 < y) list->row++;
+        while (list->row < before && list->all.items[list->row].y1 < y) list->row++;
     }
     for (int i = 0; i < n; i++) sqlite3_free(bands[i].is_there);
     return code;
@@ -136,27 +131,26 @@ static int add_band(tiles *t, int z, const tile_range *all, int n, int32_t y0, i
 int layer_available(tiles *t, int z, const tile_range **ranges, size_t *count, char **error) {
     tile_plan *plan = t->plan;
     tile_range all[MOST_TURNS];
-    range_list list = {0};
+    row_list list = {0};
     *ranges = NULL;
     *count = 0;
     if (z < 0 || z > plan->finest) return SQLITE_OK;
     int code = SQLITE_OK;
     if (!plan->ranges[z]) {
         const int n = z > 0 ? plan_ranges(t, z, all) : 0;
-        list.items = sqlite3_malloc(MOST_TURNS * sizeof *list.items);
-        list.capacity = list.items ? MOST_TURNS : 0;
-        if (!list.items) return SQLITE_NOMEM;
+        code = tiles_add_range(&list.all, (tile_range){0}); /* so that there is memory even for none */
+        list.all.count = 0;
         for (int i = 0; i < n && t->terrain->voids == 0 && code == SQLITE_OK; i++) code = add_range(&list, all[i]);
         const int32_t y1 = n ? all[0].y1 : -1; /* all ranges have the same rows */
         for (int32_t y = n ? all[0].y0 : 0; y <= y1 && t->terrain->voids && code == SQLITE_OK; y += SQUARE)
             code = add_band(t, z, all, n, y, y1 - y < SQUARE ? y1 : y + SQUARE - 1, &list, error);
         if (z == 0 && code == SQLITE_OK) code = add_range(&list, (tile_range){0, 1, 0, 0});
         if (code != SQLITE_OK) {
-            sqlite3_free(list.items);
+            sqlite3_free(list.all.items);
             return code;
         }
-        plan->ranges[z] = list.items;
-        plan->range_count[z] = list.count;
+        plan->ranges[z] = list.all.items;
+        plan->range_count[z] = list.all.count;
     }
     *ranges = plan->ranges[z];
     *count = plan->range_count[z];

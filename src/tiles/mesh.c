@@ -17,7 +17,8 @@
  * with the largest moves in longitude, latitude, height of any vertex of the tile (the line between the two places
  * is no shorter than the chord), R no less than any radius of curvature and the height above it, phi the latitude
  * of the tile that is nearest to the equator. Whatever flips or folds: each sample has a point of the decoded mesh
- * within error = eps + that, which is no more than the level's geometric error, by the choice of eps.
+ * within error = eps + that (for eps what heights were rounded by, where that is more), which is no more than the
+ * level's geometric error, by the choice of levels and eps.
  *
  * Above or below. Clients that ask for a height (sampleTerrain) go straight down in longitude, latitude, height.
  * Rounding maps the cut onto the decoded mesh, linearly in each triangle: a place s that a decoded triangle covers
@@ -31,7 +32,7 @@
  * heights of corners are H + G(place), and G is not linear in between: that adds what it may differ by within the
  * largest triangle, and along the move.
  */
-#include "internal.h"
+#include "quantized_mesh.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -160,14 +161,17 @@ static int place_vertex(const tiles *t, const tile_place *place, tile_mesh *mesh
 
 /* -------------------------------------------------------------------------------------------------- sides -- */
 
+/* Vertices that rounding puts into one place go by where they were: in both tiles the same way. */
 typedef struct side_vertex {
     uint16_t along;
+    double place; /* samples; grows with along */
     uint32_t vertex;
 } side_vertex;
 
 static int by_place(const void *a, const void *b) {
     const side_vertex *p = a, *q = b;
     if (p->along != q->along) return p->along < q->along ? -1 : 1;
+    if (p->place != q->place) return p->place < q->place ? -1 : 1;
     return (p->vertex > q->vertex) - (p->vertex < q->vertex);
 }
 
@@ -181,7 +185,10 @@ static int list_side(tile_mesh *mesh, int side) {
     mesh->edge[side] = sqlite3_malloc64((count + 1) * sizeof *mesh->edge[side]);
     if (list && mesh->edge[side]) {
         for (size_t i = 0; i < mesh->cut.vertex_count; i++)
-            if (across[i] == there) list[n++] = (side_vertex){along[i], (uint32_t)i};
+            if (across[i] == there) {
+                const rqt_cut_vertex *v = &mesh->cut.vertices[i];
+                list[n++] = (side_vertex){along[i], along == mesh->v ? -v->row : v->col, (uint32_t)i};
+            }
         qsort(list, count, sizeof *list, by_place);
         for (size_t i = 0; i < count; i++) mesh->edge[side][i] = list[i].vertex;
         mesh->edge_count[side] = (uint32_t)count;

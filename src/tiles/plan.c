@@ -9,8 +9,9 @@
  * as long as that is no more than a pixel or two. So eps(z) = G(z) - move(z), where move(z) is the most that
  * quantisation moves a vertex (mesh.c): then what is promised is true at every level, whatever the terrain. The
  * last level, the first whose tiles are no more than 64 samples a side, is as fine as clients get to see: its eps
- * is half a quantum of the terrain's heights where that is less, and the mesh is the terrain. Voids may ask for
- * less at the first levels (keep_ground).
+ * is LAST_EPS quanta of the terrain's heights where that is less, and the mesh is the terrain, to a rounding of
+ * heights. Levels end before that where quantisation, or what the terrain's own heights were rounded by, would
+ * leave a mesh no room in G(z). Voids may ask for less at the first levels (keep_ground).
  *
  * One eps at a level, one rule, one mesh: tiles are parts of it. The rule is lowered by what the Earth's curvature
  * takes from flat triangles (geo_frame_sag), as option frame does, for clients draw chords in space.
@@ -24,7 +25,7 @@
  * rounded, and once more to 2^-20 sample, as regions are: functions of the side alone, so that neighbours have it
  * in common.
  */
-#include "internal.h"
+#include "quantized_mesh.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -36,7 +37,7 @@
 #define GEOID_HIGHEST 120.0 /* EGM96 lies between -107 and 86 */
 #define ROOT_ERROR (EQUATOR * 2 * M_PI * 0.25 / (65 * 2))
 enum { LARGEST_TILE = 64, FIRST_STEP = -10, UNIT_BITS = 20 };
-#define LAST_EPS 0.625
+#define LAST_EPS 0.625              /* quanta of height */
 #define FARTHEST ((int64_t)1 << 60) /* units: as regions have it */
 
 /* ------------------------------------------------------------------------------------------------- levels -- */
@@ -89,7 +90,8 @@ static void set_levels(const store_terrain *t, tile_plan *plan) {
         const double side = ldexp(180, -z), unit = side * DEGREE / TILE_UNITS * plan->radius;
         const double move = hypot(M_SQRT2 * unit, plan->step / 2 + plan->merging);
         level->geometric_error = ldexp(ROOT_ERROR, -z);
-        if (z > 0 && move > level->geometric_error / 2) break; /* finer than heights are told */
+        const double least = fmax(2 * move, plan->rounded + move);
+        if (z > 0 && least > level->geometric_error) break; /* finer than heights are told */
         plan->finest = z;
         level->eps = level->geometric_error - move;
         if (side > LARGEST_TILE * sample) continue;
@@ -111,10 +113,10 @@ static int keep_ground(tiles *t, char **error) {
     if (t->terrain->voids == 0) return SQLITE_OK;
     if (rqt_region_create(NULL, &as_it_is, &t->terrain->lattice, store_allocator(), &all) != RQT_OK)
         return SQLITE_NOMEM;
-    int code = plan_has_triangle(t, all, most, &options, &is_there, error);
+    int code = tiles_has_triangle(t, all, most, &options, &is_there, error);
     while (code == SQLITE_OK && !is_there && most > cell / 2) { /* finer outlines have no more */
         most /= 2;
-        code = plan_has_triangle(t, all, most, &options, &is_there, error);
+        code = tiles_has_triangle(t, all, most, &options, &is_there, error);
     }
     for (int z = 0; z <= plan->finest && is_there; z++) plan->level[z].eps = fmin(plan->level[z].eps, most);
     rqt_region_free(all);
@@ -169,24 +171,6 @@ store_query_options plan_options(const tiles *t, int z) {
                                  .metric = RQT_METRIC_EXACT,
                                  .product = RQT_PRODUCT_TRIANGLES,
                                  .rule = plan->level[z].rule ? plan->level[z].rule : plan->rule};
-}
-
-int plan_has_triangle(tiles *t, const rqt_region *region, double eps, const store_query_options *options,
-                      bool *is_there, char **error) {
-    store_limits *limits = store_limits_of(t->store);
-    const int64_t before = limits->triangles;
-    rqt_patch patch = {0};
-    limits->triangles = 1; /* more is not looked for */
-    int code = store_query(t->store, t->terrain, region, eps, options, &patch, NULL, error);
-    limits->triangles = before;
-    *is_there = code == SQLITE_TOOBIG || patch.triangle_count > 0;
-    if (code == SQLITE_TOOBIG) {
-        sqlite3_free(*error);
-        *error = NULL;
-        code = SQLITE_OK;
-    }
-    store_keep(t->store, &patch);
-    return code;
 }
 
 /* ------------------------------------------------------------------------------------------------- places -- */

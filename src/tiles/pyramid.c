@@ -4,11 +4,13 @@
  * Workers take pieces of rows, each with a connection of its own; a tile's bytes depend on nothing but the terrain,
  * so it does not matter which makes it. Each file is written beside its place and renamed: it is there whole or not
  * at all, and what is there need not be made again. FOLDER/.rqt-tiles says of what the tiles are: terrain, state of
- * the database, options. A folder that says something else is another's, and is refused; while somebody works in it
- * the file is locked. The document comes last, so a folder that has it is complete.
+ * the database, options. A folder that says something else, or holds files and says nothing, is another's, and is
+ * refused; while somebody works in it the file is locked. The document comes last, so a folder that has it is
+ * complete.
  */
 #include "internal.h"
 
+#include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <pthread.h>
@@ -200,9 +202,9 @@ static void watch(pyramid *p, int64_t all) {
 }
 
 static int run_workers(pyramid *p, int64_t all, char **error) {
-    pthread_t threads[64];
+    pthread_t threads[MOST_WORKERS];
     int begun = 0;
-    const int wanted = p->job->workers < 1 ? 1 : p->job->workers > 64 ? 64 : p->job->workers;
+    const int wanted = p->job->workers;
     pthread_mutex_init(&p->lock, NULL);
     pthread_cond_init(&p->ended, NULL);
     p->working = wanted;
@@ -274,6 +276,20 @@ static int list_pieces(pyramid *p, tiles *t, int64_t *all, char **error) {
     return code;
 }
 
+/* Is there nothing in the folder but its description? Tiles that nobody says anything of would be taken for ours.
+ */
+static int check_empty(const char *folder, char **error) {
+    DIR *files = opendir(folder);
+    if (!files) return fail_file(error, folder);
+    bool is_empty = true;
+    for (const struct dirent *f; (f = readdir(files));)
+        is_empty &= !strcmp(f->d_name, ".") || !strcmp(f->d_name, "..") || !strcmp(f->d_name, ".rqt-tiles");
+    closedir(files);
+    if (is_empty) return SQLITE_OK;
+    return tiles_fail(error, "%s holds files that are not of rqt tiles: give another folder, or an empty one",
+                      folder);
+}
+
 /* Makes the folder ours: *file holds its lock. */
 static int claim_folder(const tiles_job *job, const char *description, int *file, char **error) {
     char path[MOST_PATH], there[1024] = "";
@@ -287,8 +303,10 @@ static int claim_folder(const tiles_job *job, const char *description, int *file
     const size_t size = strlen(description);
     const ssize_t n = read(*file, there, sizeof there);
     if (n < 0) return fail_file(error, path);
-    if (n == 0) return write(*file, description, size) == (ssize_t)size ? SQLITE_OK : fail_file(error, path);
-    if ((size_t)n < size && memcmp(there, description, (size_t)n) == 0) /* killed at this very place */
+    if (n == 0) code = check_empty(job->folder, error);
+    if (code != SQLITE_OK) unlink(path);
+    if (code != SQLITE_OK) return code;
+    if ((size_t)n < size && memcmp(there, description, (size_t)n) == 0) /* new, or killed at this very place */
         return pwrite(*file, description, size, 0) == (ssize_t)size ? SQLITE_OK : fail_file(error, path);
     if ((size_t)n == size && memcmp(there, description, size) == 0) return SQLITE_OK;
     return tiles_fail(

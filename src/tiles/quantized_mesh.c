@@ -1,7 +1,7 @@
 /* quantized_mesh.c - the kind quantized-mesh 1.0, for Cesium and others: tiles z/x/y.terrain, described by
- * layer.json. Its parts are told in internal.h.
+ * layer.json. Its parts are told in quantized_mesh.h.
  */
-#include "internal.h"
+#include "quantized_mesh.h"
 
 static int finest(const tiles *t) {
     return plan_of(t)->finest;

@@ -11,7 +11,7 @@
  * by a rounding) vertices are moved, and what tiles on both sides state has it. Columns that contradict each other,
  * in voids or by more than levels can bear, are two: no mesh is true to both.
  */
-#include "internal.h"
+#include "quantized_mesh.h"
 
 #include <math.h>
 #include <string.h>

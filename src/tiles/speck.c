@@ -14,7 +14,7 @@
  * A triangle counts that meets the square about the middle: what clients round by is far less than what lies around
  * it, so that whatever they do a vertex remains of it. Tiles that the terrain covers have no speck.
  */
-#include "internal.h"
+#include "quantized_mesh.h"
 
 enum { CELLS = 4, CELL = (TILE_UNITS + 1) / CELLS, MARGIN = CELL / 8 };
 

@@ -16,8 +16,7 @@ const tile_kind *tiles_kind(const char *name) {
     return NULL;
 }
 
-/* ------------------------------------------------------------------------------------ what kinds have in common --
- */
+/* ------------------------------------------------------------------------------- what kinds have in common -- */
 
 int tiles_fail(char **error, const char *format, ...) {
     va_list arguments;
@@ -83,8 +82,37 @@ int tiles_print(cJSON *document, tile_bytes *out) {
     return out->bytes ? SQLITE_OK : SQLITE_NOMEM;
 }
 
-/* ------------------------------------------------------------------------------------------------- a connection --
- */
+int tiles_has_triangle(tiles *t, const rqt_region *region, double eps, const store_query_options *options,
+                       bool *is_there, char **error) {
+    store_limits *limits = store_limits_of(t->store);
+    const int64_t before = limits->triangles;
+    rqt_patch patch = {0};
+    limits->triangles = 1; /* more is not looked for */
+    int code = store_query(t->store, t->terrain, region, eps, options, &patch, NULL, error);
+    limits->triangles = before;
+    *is_there = code == SQLITE_TOOBIG || patch.triangle_count > 0;
+    if (code == SQLITE_TOOBIG) {
+        sqlite3_free(*error);
+        *error = NULL;
+        code = SQLITE_OK;
+    }
+    store_keep(t->store, &patch);
+    return code;
+}
+
+int tiles_add_range(range_list *list, tile_range range) {
+    if (list->count == list->capacity) {
+        const size_t capacity = list->capacity ? 2 * list->capacity : 16;
+        tile_range *items = sqlite3_realloc64(list->items, capacity * sizeof *items);
+        if (!items) return SQLITE_NOMEM;
+        list->items = items;
+        list->capacity = capacity;
+    }
+    list->items[list->count++] = range;
+    return SQLITE_OK;
+}
+
+/* -------------------------------------------------------------------------------------------- a connection -- */
 
 int tiles_open(sqlite3 *db, tiles **out) {
     tiles *t = sqlite3_malloc(sizeof *t);

@@ -76,12 +76,13 @@ int tiles_document(tiles *t, const char *root, int first, int last, tile_bytes *
 int tiles_make(tiles *t, int series, int z, int32_t x, int32_t y, tile_bytes *out, char **error);
 
 /* ------------------------------------------------------------------------------------------------- to disk -- */
+enum { MOST_WORKERS = 64 };
 typedef struct tiles_job {
     const tile_kind *kind;
     const char *database, *terrain, *folder;
     int first, last; /* levels; last beyond the finest: the finest */
     bool gzip;
-    int workers;
+    int workers; /* 1 .. MOST_WORKERS */
     /* A connection for a worker, with the SQL functions or without; NULL after a sentence of its own. */
     sqlite3 *(*connect)(void *context);
     /* So many tiles of so many are there; false stops (SQLITE_INTERRUPT). Called by one thread. May be NULL. */
@@ -94,7 +95,8 @@ typedef struct tiles_report {
     int finest;             /* level that was written last */
 } tiles_report;
 /* Writes the series, and at last the document, each file whole or not at all. A folder of the same
- * job that did not finish is gone on with; one of another terrain, state or of other options is refused. */
+ * job that did not finish is gone on with; one of another terrain, state or of other options is refused, and one
+ * with files that are not of a job. */
 int tiles_write(const tiles_job *job, tiles_report *report, char **error);
 
 #endif

@@ -25,25 +25,7 @@ static int finest(const tiles *t) {
     return block_plan_of(t)->finest;
 }
 
-/* ------------------------------------------------------------------------------------------------ availability --
- */
-
-typedef struct range_list {
-    tile_range *items;
-    size_t count, capacity;
-} range_list;
-
-static int add_range(range_list *list, tile_range range) {
-    if (list->count == list->capacity) {
-        const size_t capacity = list->capacity ? 2 * list->capacity : 16;
-        tile_range *items = sqlite3_realloc64(list->items, capacity * sizeof *items);
-        if (!items) return SQLITE_NOMEM;
-        list->items = items;
-        list->capacity = capacity;
-    }
-    list->items[list->count++] = range;
-    return SQLITE_OK;
-}
+/* -------------------------------------------------------------------------------------------- availability -- */
 
 static int is_available(tiles *t, int series, block_tile tile, bool *is_there, char **error) {
     store_relief relief;
@@ -60,7 +42,7 @@ static int add_row(tiles *t, int series, int z, int32_t y, int32_t x1, range_lis
         bool is_there = false;
         int code = x <= x1 ? is_available(t, series, block_tile_of(z, x, y), &is_there, error) : SQLITE_OK;
         if (code == SQLITE_OK && !is_there && first >= 0) {
-            code = add_range(list, (tile_range){first, x - 1, y, y});
+            code = tiles_add_range(list, (tile_range){first, x - 1, y, y});
             first = -1;
         }
         if (code != SQLITE_OK) return code;
@@ -75,13 +57,13 @@ static int list_ranges(tiles *t, int series, int z, range_list *list, char **err
     const int32_t last = (int32_t)((INT64_C(1) << z) - 1);
     const int32_t x1 = terrain->lattice.width > 1 ? (terrain->lattice.width - 2) >> scale : 0;
     const int32_t y0 = last - (terrain->lattice.height > 1 ? (terrain->lattice.height - 2) >> scale : 0);
-    int code = add_range(list, (tile_range){0}); /* so that there is memory even for none */
+    int code = tiles_add_range(list, (tile_range){0}); /* so that there is memory even for none */
     list->count = 0;
     if (series == SUBTREES && z % SUBTREE_LEVELS != 0) return code;
     if (code == SQLITE_OK && (series == SUBTREES || terrain->voids == 0)) {
         bool is_there;
         code = is_available(t, series, (block_tile){z, 0, 0}, &is_there, error);
-        return code == SQLITE_OK && is_there ? add_range(list, (tile_range){0, x1, y0, last}) : code;
+        return code == SQLITE_OK && is_there ? tiles_add_range(list, (tile_range){0, x1, y0, last}) : code;
     }
     for (int32_t y = y0; y <= last && code == SQLITE_OK; y++) code = add_row(t, series, z, y, x1, list, error);
     return code;
@@ -115,8 +97,7 @@ static int make(tiles *t, int series, int z, int32_t x, int32_t y, tile_bytes *o
     return code;
 }
 
-/* ------------------------------------------------------------------------------------------------- tileset.json --
- */
+/* --------------------------------------------------------------------------------------------- tileset.json -- */
 
 static cJSON *property(const char *semantic, const char *description) {
     cJSON *p = cJSON_CreateObject();

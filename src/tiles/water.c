@@ -4,7 +4,7 @@
  *
  * The runs are read once for all tiles, 12 bytes each.
  */
-#include "internal.h"
+#include "quantized_mesh.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,6 +1,6 @@
 """Mutants of the tiles: see ../mutants.py."""
 
-TILES, COVERED = "test_tiles.py", "boxes_are_covered_as_the_mesh_covers_them"
+COMMON, TILES, COVERED = "src/tiles/tiles.c", "test_tiles.py", "boxes_are_covered_as_the_mesh_covers_them"
 PLAN, MESH, GLOBE, WATER, ENCODE, LAYER, PYRAMID = ("src/tiles/%s.c" % name for name in ("plan", "mesh", "globe", "water", "encode", "layer", "pyramid"))
 
 MUTANTS = [
@@ -13,6 +13,7 @@ MUTANTS = [
     ("tiles: quantisation takes no part of a level's error", PLAN, "level->eps = level->geometric_error - move;", "level->eps = level->geometric_error;", TILES,
      "no more than what clients take"),
     ("tiles: the last level is finer than need be", PLAN, "#define LAST_EPS 0.625", "#define LAST_EPS 0.5", TILES, "1.1 times the vertices"),
+    ("tiles: what heights were rounded by ends no level", PLAN, "fmax(2 * move, plan->rounded + move)", "2 * move", TILES, "steps: what is stated is no more than what clients take"),
     # neighbours
     ("tiles: heights begin at each tile's own", ENCODE, "put_float(w, (float)plan->lowest);", "put_float(w, (float)globe->centre[0]);", TILES, "one range of heights"),
     ("tiles: steps of any size", PLAN, "plan->step = ldexp(1, FIRST_STEP);", "plan->step = 0.001;", TILES, "32767 steps of a power of two"),
@@ -22,6 +23,7 @@ MUTANTS = [
      "no sample is further above or below"),
     ("tiles: the north side is not listed", MESH, "const uint16_t there = side == WEST || side == SOUTH ? 0 : TILE_UNITS;", "const uint16_t there = side == WEST || side == SOUTH ? 0 : TILE_UNITS - (side == NORTH);",
      TILES, "lists of sides"),
+    ("tiles: vertices of a side in one place go by their numbers", MESH, "if (p->place != q->place) return p->place < q->place ? -1 : 1;", "", TILES, "steps: shared edges decode to identical"),
     # space
     ("tiles: the sphere is a hair too small", GLOBE, "globe->radius = sqrt(most) * (1 + 1e-9) + 1e-6;", "globe->radius = sqrt(most) * (1 - 1e-7);", TILES, "spheres hold every vertex"),
     ("tiles: heights do not rise over the horizon", GLOBE, "(along - across * sqrt(m2 - 1)) / sqrt(m2)", "along", TILES, "below the horizon"),
@@ -38,7 +40,7 @@ MUTANTS = [
     ("tiles: water masks are whole", WATER, "== 0 ? 1 :", "== 0 ? WATER_SIDE * WATER_SIDE :", TILES, "one byte of it"),
     # which there are
     ("tiles: rows are counted from the north", LAYER, 'cJSON_AddNumberToObject(range, "startY", ranges[i].y0);', 'cJSON_AddNumberToObject(range, "startY", (1 << z) - 1 - ranges[i].y0);', TILES, "the same tiles"),
-    ("tiles: tiles of voids are listed", PLAN, "*is_there = code == SQLITE_TOOBIG || patch.triangle_count > 0;", "*is_there = true;", TILES, "the same tiles"),
+    ("tiles: tiles of voids are listed", COMMON, "*is_there = code == SQLITE_TOOBIG || patch.triangle_count > 0;", "*is_there = true;", TILES, "the same tiles"),
     ("tiles: squares of tiles are there when one is", LAYER, "if (cover == STORE_COVER_UNKNOWN && (r->x0", "if (false && (r->x0", TILES, "no others"),
     ("tiles: squares are a row short", LAYER, "y1 - y < SQUARE ? y1 : y + SQUARE - 1", "y1 - y < SQUARE ? y1 : y + SQUARE - 2", TILES, "no others"),
     ("covers: blocks with voids cover all", "src/store/query.c", "!header.has_voids && !header.all_void && all", "!header.all_void && all", "test_store_cover", COVERED),
@@ -55,6 +57,8 @@ MUTANTS = [
     # to disk
     ("tiles: all is made again", PYRAMID, "if (stat(path, &there) == 0) return SQLITE_OK;", "(void)there;", TILES, "without making again"),
     ("tiles: anybody's folder will do", PYRAMID, "if ((size_t)n == size && memcmp(there, description, size) == 0) return SQLITE_OK;", "return SQLITE_OK;", TILES, "are not mixed in"),
+    ("tiles: what nobody says anything of is ours", PYRAMID, "if (n == 0) code = check_empty(job->folder, error);", "if (n < 0) code = check_empty(job->folder, error);", TILES, "says nothing of its files"),
+    ("tiles: two commands write into one folder", PYRAMID, "if (flock(*file, LOCK_EX | LOCK_NB))", "if (flock(*file, LOCK_UN))", TILES, "by one command at a time"),
     ("tiles: gzip is not asked for", PYRAMID, "if (p->job->gzip && !series->is_packed) code = pack(&tile);", "", TILES, "all tiles are compressed"),
     ("tiles: numbers of paths may begin with 0", "src/serve/endpoints.c", "|| (digits > 1 && *segment == '0')", "", TILES, "no tile at 00/1/0"),
     ("tiles: what is behind a number does not matter", "src/serve/endpoints.c", "return strlen(segment + digits) == rest && memcmp(segment + digits, close + 1, rest) == 0;", "return rest + 1 > 0;", TILES,
