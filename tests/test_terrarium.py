@@ -264,6 +264,12 @@ s.run([s.RQT, "tiles", hostile, "-o", s.temp("hostile"), "--kind", "terrarium", 
 attribution = json.load(open(s.temp("hostile/tile.json")))["attribution"]
 s.check("names of files are no HTML in the attribution", "&#60;b&#62;&#38;amp;" in attribution and "<" not in attribution, attribution)
 
+s.run([s.RQT, "tiles", hostile, "-o", s.temp("deep/er/placed"), "--kind", "terrarium", "--levels", "0", "--url", "https://example.org/maps"])
+s.equal("addresses are whole where the folder's is told, and folders are made", json.load(open(s.temp("deep/er/placed/tile.json")))["tiles"], ["https://example.org/maps/{z}/{x}/{y}.png"])
+for url in ("ftp://example.org/", "https://", "example.org", 'https://a"b/', "https://a/?b"):
+    refused = subprocess.run([s.RQT, "tiles", hostile, "-o", s.temp("deep"), "--kind", "terrarium", "--url", url], capture_output=True, text=True)
+    s.check("no address: " + url, refused.returncode == 2 and "--url" in refused.stderr, refused.stderr)
+
 # --------------------------------------------------------------------------------------------------------- the service
 plane = s.temp("plane.gpkg")
 s.run([s.RQT, "import", "--name", "plane", os.path.join(s.DATA, "glarus_gentle_25m_161.tif"), plane])
@@ -295,6 +301,15 @@ told = server.ask(root + "tile.json").json()
 s.equal("all else is the command's", {**told, "tiles": 0}, {**ALPS.json, "tiles": 0})
 answer = server.ask("/collections/plane/tiles/terrarium/tile.json")
 s.check("a terrain without tiles says why", answer.status == 400 and "longitude and latitude on WGS 84" in answer.detail(), answer.detail())
+
+
+def tiles_linked(name):
+    hrefs = [link["href"] for link in server.ask("/collections/" + name).json()["links"] if "/tiles/" in link["href"]]
+    return [href.rsplit("/tiles/")[1] for href in hrefs if server.ask(href[href.index("/collections"):]).status == 200]
+
+
+s.equal("a terrain's document links to its tiles", tiles_linked(ALPS.name), ["quantized-mesh/layer.json", "3d-tiles/tileset.json", "terrarium/tile.json"])
+s.equal("... where it has any", tiles_linked("plane"), [])
 s.equal("the service ends well", server.stop()[0], 0)
 
 s.finish()

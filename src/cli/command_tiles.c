@@ -25,19 +25,25 @@ static const char HELP[] =
     "  --kind K             of the kinds above (default: quantized-mesh)\n"
     "  --terrain T          of several terrains\n"
     "  --levels A-B         levels A to B, or one (default: all, to the first with the resolution of the raster)\n"
+    "  --url URL            where FOLDER will be served: MapLibre wants whole addresses in tile.json\n"
     "  --gzip               tiles compressed, to be served with Content-Encoding: gzip; PNG stay as they are\n"
     "  --jobs J             workers, 1 to 64 (default: one for each processor)\n"
     "  --help               this text\n"
     "\n"
     "Examples:\n"
     "  rqt tiles washington.gpkg -o tiles\n"
-    "  rqt tiles alps.gpkg --terrain swiss --levels 0-12 --gzip -o /srv/www/tiles\n";
+    "  rqt tiles alps.gpkg --terrain swiss --levels 0-12 --gzip -o /srv/www/tiles\n"
+    "  rqt tiles alps.gpkg --kind terrarium --url https://example.org/alps/ -o /srv/www/alps\n";
 
-static const struct option OPTIONS[] = {
-    {"output", required_argument, NULL, 'o'},  {"kind", required_argument, NULL, 'k'},
-    {"terrain", required_argument, NULL, 't'}, {"levels", required_argument, NULL, 'l'},
-    {"gzip", no_argument, NULL, 'g'},          {"jobs", required_argument, NULL, 'j'},
-    {"help", no_argument, NULL, 'h'},          {NULL, 0, NULL, 0}};
+static const struct option OPTIONS[] = {{"output", required_argument, NULL, 'o'},
+                                        {"kind", required_argument, NULL, 'k'},
+                                        {"terrain", required_argument, NULL, 't'},
+                                        {"levels", required_argument, NULL, 'l'},
+                                        {"url", required_argument, NULL, 'u'},
+                                        {"gzip", no_argument, NULL, 'g'},
+                                        {"jobs", required_argument, NULL, 'j'},
+                                        {"help", no_argument, NULL, 'h'},
+                                        {NULL, 0, NULL, 0}};
 
 /* "3-7" or "5". */
 static bool read_levels(const char *text, tiles_job *job) {
@@ -50,6 +56,17 @@ static bool read_levels(const char *text, tiles_job *job) {
     if (!cli_integer(minus ? minus + 1 : text, first, TILES_LEVELS - 1, &last)) return false;
     job->first = (int)first;
     job->last = (int)last;
+    return true;
+}
+
+/* With a slash at its end. */
+static bool read_url(const char *text, char *url, size_t room) {
+    const size_t n = strlen(text), scheme = strncmp(text, "https://", 8) == 0 ? 8 : 7;
+    if (strncmp(text, "http://", 7) != 0 && scheme == 7) return false;
+    if (!text[scheme] || text[scheme] == '/' || n + 2 > room) return false;
+    for (const char *p = text; *p; p++)
+        if (*p <= ' ' || *p >= 0x7F || strchr("\"<>\\^`{|}?#", *p)) return false;
+    snprintf(url, room, "%s%s", text, text[n - 1] == '/' ? "" : "/");
     return true;
 }
 
@@ -91,6 +108,7 @@ static int write_tiles(tiles_job *job) {
 }
 
 static int run(int argc, char **argv) {
+    char url[512];
     const long processors = sysconf(_SC_NPROCESSORS_ONLN);
     tiles_job job = {.kind = tile_kinds[0],
                      .last = TILES_LEVELS - 1,
@@ -115,6 +133,11 @@ static int run(int argc, char **argv) {
         case 'l':
             if (!read_levels(optarg, &job))
                 return cli_usage("--levels %s: two levels like 0-12, or one, of 0 to %d", optarg, TILES_LEVELS - 1);
+            break;
+        case 'u':
+            if (!read_url(optarg, url, sizeof url))
+                return cli_usage("--url %s: an address like https://example.org/tiles/", optarg);
+            job.url = url;
             break;
         case 'g':
             job.gzip = true;

@@ -79,10 +79,12 @@ void answer_conformance(worker *w, request *r) {
 /* ----------------------------------------------------------------------------------------------- collections -- */
 
 /* In the order of `columns` below. */
-enum { NAME, SRID, WIDTH, HEIGHT, X0, Y0, DX, DY, FIRST_TOLD };
-#define COLUMNS                                                                                                \
-    "name, srid, width, height, x0, y0, dx, dy, cell_x, cell_y, min_z, max_z, quantum, quantum_error, voids, " \
-    "blocks, bytes, max_error, k, crs, crs_name, lonlat, metre, semi_major, inverse_flattening, vertical, created"
+enum { NAME, SRID, WIDTH, HEIGHT, X0, Y0, DX, DY, LONLAT, INVERSE_FLATTENING };
+#define WGS84 298.257223563
+#define COLUMNS                                                                                             \
+    "name, srid, width, height, x0, y0, dx, dy, lonlat, inverse_flattening, cell_x, cell_y, min_z, max_z, " \
+    "quantum, quantum_error, voids, "                                                                       \
+    "blocks, bytes, max_error, k, crs, crs_name, metre, semi_major, vertical, created"
 
 static void add_column(cJSON *object, sqlite3_stmt *row, int i) {
     const char *name = sqlite3_column_name(row, i);
@@ -109,6 +111,15 @@ static void add_extent(cJSON *collection, sqlite3_stmt *row) {
         cJSON_AddStringToObject(spatial, "crs", crs);
 }
 
+/* Of terrains in longitude and latitude on WGS 84; which of them have no tiles all the same the tiles say. */
+static void add_tiles(cJSON *links, sqlite3_stmt *row, const char *name) {
+    if (!sqlite3_column_int(row, LONLAT) || fabs(sqlite3_column_double(row, INVERSE_FLATTENING) - WGS84) > 1e-8)
+        return;
+    for (const tile_kind *const *kind = tile_kinds; *kind; kind++)
+        add_link(links, "related", JSON, "tiles for globes and maps", "/collections/%s/tiles/%s/%s", name,
+                 (*kind)->name, (*kind)->document);
+}
+
 static cJSON *collection_of(sqlite3_stmt *row) {
     const char *name = (const char *)sqlite3_column_text(row, NAME);
     cJSON *c = cJSON_CreateObject();
@@ -131,6 +142,7 @@ static cJSON *collection_of(sqlite3_stmt *row) {
                   {"area", "areas and volume; eps, bbox, wkt"}};
     for (size_t i = 0; i < sizeof others / sizeof *others; i++)
         add_link(links, "related", JSON, others[i].title, "/collections/%s/%s", name, others[i].path);
+    add_tiles(links, row, name);
     return c;
 }
 

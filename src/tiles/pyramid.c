@@ -57,6 +57,19 @@ static int make_folder(const char *path, char **error) {
     return mkdir(path, 0777) == 0 || errno == EEXIST ? SQLITE_OK : fail_file(error, path);
 }
 
+/* With those above it. */
+static int make_path(const char *folder, char **error) {
+    char path[MOST_PATH];
+    snprintf(path, sizeof path, "%s", folder);
+    for (char *slash = path + 1; (slash = strchr(slash, '/')) != NULL; slash++) {
+        *slash = 0;
+        const int code = make_folder(path, error);
+        if (code != SQLITE_OK) return code;
+        *slash = '/';
+    }
+    return make_folder(path, error);
+}
+
 /* Whole or not at all. */
 static int write_file(const char *path, const void *bytes, size_t size, char **error) {
     char part[MOST_PATH + 8];
@@ -104,10 +117,11 @@ static char *describe_job(const tiles_job *job, const tiles *t, int last) {
     if (stat(job->database, &file) || stat(path, &log)) log = (struct stat){0};
     return sqlite3_mprintf(
         "rqt %s\n%s of terrain %s of %s\ndatabase %lld bytes, %lld.%09ld s, log %lld bytes, %lld.%09ld s\n"
-        "levels %d to %d%s\n",
+        "levels %d to %d%s%s%s\n",
         RQT_VERSION, job->kind->name, t->terrain->name, t->terrain->created, (long long)file.st_size,
         (long long)file.st_mtim.tv_sec, (long)file.st_mtim.tv_nsec, (long long)log.st_size,
-        (long long)log.st_mtim.tv_sec, (long)log.st_mtim.tv_nsec, job->first, last, job->gzip ? ", gzip" : "");
+        (long long)log.st_mtim.tv_sec, (long)log.st_mtim.tv_nsec, job->first, last, job->gzip ? ", gzip" : "",
+        job->url ? " at " : "", job->url ? job->url : "");
 }
 
 /* Does a connection that has begun to read see what the tiles are of? Asked after it has begun: a commit in between
@@ -293,7 +307,7 @@ static int check_empty(const char *folder, char **error) {
 /* Makes the folder ours: *file holds its lock. */
 static int claim_folder(const tiles_job *job, const char *description, int *file, char **error) {
     char path[MOST_PATH], there[1024] = "";
-    int code = make_folder(job->folder, error);
+    int code = make_path(job->folder, error);
     if (code != SQLITE_OK) return code;
     snprintf(path, sizeof path, "%s/.rqt-tiles", job->folder);
     *file = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0666);
@@ -320,7 +334,7 @@ static int write_document(tiles *t, const tiles_job *job, int last, char **error
     char path[MOST_PATH];
     tile_bytes document;
     snprintf(path, sizeof path, "%s/%s", job->folder, job->kind->document);
-    int code = tiles_document(t, "", job->first, last, &document, error);
+    int code = tiles_document(t, job->url ? job->url : "", job->first, last, &document, error);
     if (code == SQLITE_OK) code = write_file(path, document.bytes, document.size, error);
     sqlite3_free(document.bytes);
     return code;
@@ -333,6 +347,8 @@ static int write_all(pyramid *p, tiles *t, tiles_report *report, char **error) {
     p->last = job->last < finest ? job->last : finest;
     if (strlen(job->folder) > MOST_PATH - 64) return tiles_fail(error, "the folder's name is too long");
     if (job->first > p->last) return tiles_fail(error, "terrain %s has levels 0 to %d", t->terrain->name, finest);
+    if (job->url && !job->kind->has_addresses)
+        return tiles_fail(error, "%s needs no URL: its addresses are relative", job->kind->name);
     if (job->kind->is_whole && (job->first > 0 || p->last < finest))
         return tiles_fail(error, "%s has all levels, 0 to %d, or none", job->kind->name, finest);
     p->description = describe_job(job, t, p->last);

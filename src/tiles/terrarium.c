@@ -193,6 +193,7 @@ static const tile_functions functions = {.plan_create = plan_create_pixels,
 
 const tile_kind terrarium = {.name = "terrarium",
                              .document = "tile.json",
+                             .has_addresses = true,
                              .series_count = 1,
                              .series = {{"", ".png", "image/png", true}},
                              .functions = &functions};

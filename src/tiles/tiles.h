@@ -42,6 +42,7 @@ typedef struct tile_kind {
     const char *name;     /* of its folder in the service's paths, and for people: "quantized-mesh" */
     const char *document; /* "layer.json"; application/json */
     bool is_whole;        /* levels are there all or not at all */
+    bool has_addresses;   /* clients want whole ones in the document */
     int series_count;
     tile_series series[MOST_SERIES];
     const struct tile_functions *functions;
@@ -81,6 +82,7 @@ typedef struct tiles_job {
     const tile_kind *kind;
     const char *database, *terrain, *folder;
     int first, last; /* levels; last beyond the finest: the finest */
+    const char *url; /* where the folder will be, with a slash at its end; NULL: addresses are relative */
     bool gzip;
     int workers; /* 1 .. MOST_WORKERS */
     /* A connection for a worker, with the SQL functions or without; NULL after a sentence of its own. */
