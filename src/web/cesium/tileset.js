@@ -13,7 +13,8 @@ void fragmentMain(FragmentInput fsInput, inout czm_modelMaterial material) {
     float at = height / u_spacing, line = abs(fract(at + 0.5) - 0.5) / max(fwidth(at), 1e-6);
     colour = mix(colour, vec3(0.2, 0.15, 0.1), u_contours * 0.45 * (1.0 - smoothstep(0.5, 1.0, line)));
     float lambert = max(dot(normalize(fsInput.attributes.normalEC), czm_lightDirectionEC), 0.0);
-    material.diffuse = colour * czm_lightColor * min(u_light.x * lambert + u_light.y, 1.0);
+    // Colours of the screen, as on the globe; Cesium takes what models give for linear.
+    material.diffuse = czm_srgbToLinear(min(colour * czm_lightColor * min(u_light.x * lambert + u_light.y, 1.0), 1.0));
 }`;
 
 export class TilesetSurface {
