@@ -65,9 +65,8 @@ void block_region(const tiles *t, block_tile tile, const store_relief *relief, d
  * east across the antimeridian. */
 void block_rectangle(double west, double south, double east, double north, double region[4]);
 
-/* Has the mesh of a tile a triangle in the north-western corner of its cell, whose side is so large a part of the
- * cell's, a power of two? 1: in all of it. */
-int block_has_triangle(tiles *t, block_tile tile, int32_t part, bool *has, char **error);
+/* Has the mesh of a tile a triangle? By the blocks that answer, and if they do not say, up to the first one. */
+int block_has_triangle(tiles *t, block_tile tile, bool *has, char **error);
 
 typedef struct block_mesh {
     rqt_patch patch;
@@ -82,7 +81,5 @@ void block_mesh_free(tiles *t, block_mesh *mesh);
 int block_glb_make(tiles *t, block_tile tile, const block_mesh *mesh, tile_bytes *out, char **error);
 /* The subtree whose root is the tile, which exists. */
 int subtree_make(tiles *t, block_tile tile, tile_bytes *out, char **error);
-/* The sources of a terrain in one line, to be released with sqlite3_free. */
-char *block_attribution(const store_terrain *t);
 
 #endif

@@ -32,13 +32,6 @@ static size_t index_bytes(const block_mesh *mesh) {
     return mesh->patch.vertex_count <= MOST_SHORT_INDEX ? 2 : 4;
 }
 
-char *block_attribution(const store_terrain *t) {
-    char *text = sqlite3_mprintf("%s", t->source);
-    for (char *p = text; p && *p; p++)
-        if (*p == '\n') *p = p[1] ? ' ' : 0;
-    return text;
-}
-
 /* ---------------------------------------------------------------------------------------------------- JSON -- */
 
 /* Digits that read back equal; cJSON's are off by one in the last place at times. */
@@ -58,7 +51,7 @@ static void add_asset(const tiles *t, block_tile tile, double error, cJSON *json
     cJSON *asset = cJSON_AddObjectToObject(json, "asset");
     cJSON_AddStringToObject(asset, "version", "2.0");
     cJSON_AddStringToObject(asset, "generator", "rqt " RQT_VERSION);
-    char *source = block_attribution(t->terrain);
+    char *source = tiles_attribution(t->terrain);
     if (source && *source) cJSON_AddStringToObject(asset, "copyright", source);
     sqlite3_free(source);
     cJSON *told = cJSON_AddObjectToObject(cJSON_AddObjectToObject(asset, "extras"), "rqt");

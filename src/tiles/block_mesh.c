@@ -20,6 +20,7 @@
 #define A 6378137.0
 #define F (1 / 298.257223563)
 enum { NORMAL_UNITS = 127 };
+enum { CORNER = 16 }; /* of a side, one part */
 
 /* ---------------------------------------------------------------------------------------------------- mesh -- */
 
@@ -79,14 +80,36 @@ static int query(tiles *t, block_tile tile, rqt_patch *patch, char **error) {
     return code;
 }
 
-int block_has_triangle(tiles *t, block_tile tile, int32_t part, bool *has, char **error) {
-    cell_query q;
-    *has = false;
-    int code = begin_query(t, tile, part, &q);
-    if (code == SQLITE_OK)
-        code = tiles_has_triangle(t, q.region, block_plan_of(t)->level[tile.level].error, &q.options, has, error);
-    end_query(&q);
+/* A block is walked whole before it is asked whether that is enough: a corner takes less, and most have one. */
+static int probe(tiles *t, block_tile tile, bool *has, char **error) {
+    int code = SQLITE_OK;
+    for (int32_t part = CORNER; part > 0 && code == SQLITE_OK && !*has; part = part > 1 ? 1 : 0) {
+        cell_query q;
+        if (part > 1 << (t->terrain->lattice.K - tile.level)) continue;
+        code = begin_query(t, tile, part, &q);
+        if (code == SQLITE_OK)
+            code =
+                tiles_has_triangle(t, q.region, block_plan_of(t)->level[tile.level].error, &q.options, has, error);
+        end_query(&q);
+    }
     return code;
+}
+
+int block_has_triangle(tiles *t, block_tile tile, bool *has, char **error) {
+    const rqt_lattice *lattice = &t->terrain->lattice;
+    const int32_t side = 1 << (lattice->K - tile.level);
+    const rqt_vertex from = {tile.i * side, tile.j * side},
+                     to = rqt_vertex_clamp(lattice, (rqt_vertex){from.x + side, from.y + side});
+    const int32_t box[4] = {from.x, to.x, from.y, to.y};
+    store_cover cover = STORE_COVER_UNKNOWN;
+    cell_query q;
+    int code = begin_query(t, tile, 1, &q);
+    if (code == SQLITE_OK)
+        code = store_covers(t->store, t->terrain, box, block_plan_of(t)->level[tile.level].error, &q.options,
+                            &cover, error);
+    end_query(&q);
+    *has = cover == STORE_COVER_ALL;
+    return code == SQLITE_OK && cover == STORE_COVER_UNKNOWN ? probe(t, tile, has, error) : code;
 }
 
 /* ------------------------------------------------------------------------------------------------ in space -- */

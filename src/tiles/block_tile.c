@@ -23,7 +23,6 @@
 #include <math.h>
 
 #define DEGREE 0.017453292519943295
-enum { CORNER = 16 }; /* of a side, one part */
 /* A move of m metres changes a latitude by less than m / this radians, while that is small; else any is possible.
  */
 #define NARROW 4.0e6
@@ -45,15 +44,10 @@ bool block_exists(const tiles *t, block_tile tile) {
     return rqt_block_locate(&t->terrain->lattice, t->terrain->k, number_of(tile), &place) == RQT_OK;
 }
 
-/* A block is walked whole before it is asked whether that is enough: a corner takes less, and most have one. */
 int block_has_content(tiles *t, block_tile tile, const store_relief *relief, bool *has, char **error) {
     const rqt_lattice *lattice = &t->terrain->lattice;
     *has = relief->is_valid && lattice->width > 1 && lattice->height > 1;
-    if (!relief->is_mixed) return SQLITE_OK;
-    int code = SQLITE_OK;
-    for (int32_t part = CORNER; part > 0 && code == SQLITE_OK && !*has; part = part > 1 ? 1 : 0)
-        if (part <= 1 << (lattice->K - tile.level)) code = block_has_triangle(t, tile, part, has, error);
-    return code;
+    return relief->is_mixed ? block_has_triangle(t, tile, has, error) : SQLITE_OK;
 }
 
 int block_relief(tiles *t, block_tile tile, store_relief *relief, char **error) {

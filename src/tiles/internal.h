@@ -53,6 +53,8 @@ int tiles_check_place(const store_terrain *t, char **error);
 /* Are its heights those above the ellipsoid, or above EGM96? Likewise. */
 int tiles_check_heights(const store_terrain *t, bool *is_above_geoid, char **error);
 geo_extent tiles_extent(const store_terrain *t);
+/* Where the terrain came from, in one line, to be released with sqlite3_free; NULL: no memory. */
+char *tiles_attribution(const store_terrain *t);
 /* The document's text as the answer; releases it and the JSON. */
 struct cJSON;
 int tiles_print(struct cJSON *document, tile_bytes *out);

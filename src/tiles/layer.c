@@ -216,11 +216,8 @@ static void add_bounds(const store_terrain *t, cJSON *layer) {
     cJSON_AddItemToObject(layer, "bounds", cJSON_CreateDoubleArray(bounds, 4));
 }
 
-/* Where the terrain came from, in one line. */
 static void add_attribution(const store_terrain *t, cJSON *layer) {
-    char *text = sqlite3_mprintf("%s", t->source);
-    for (char *p = text; p && *p; p++)
-        if (*p == '\n') *p = p[1] ? ' ' : 0;
+    char *text = tiles_attribution(t);
     cJSON_AddStringToObject(layer, "attribution", text ? text : "");
     sqlite3_free(text);
 }

@@ -67,25 +67,27 @@ bool lattice_misses(const lattice *l, const corner triangle[3]) {
            l->row[b.south] < g->row[0];
 }
 
-static corner corner_at(const lattice *l, int i, int j) {
+bool lattice_straddles(const lattice *l, const rqt_block_place *place, const corner triangle[3]) {
+    const lattice_box b = lattice_box_of(triangle);
+    return l->col[b.east] - l->col[b.west] != (double)(b.east - b.west) * place->stride ||
+           l->row[b.south] - l->row[b.north] != (double)(b.south - b.north) * place->stride;
+}
+
+corner lattice_corner(const lattice *l, int i, int j) {
     const size_t at = (size_t)j * (size_t)l->n + (size_t)i;
     return (corner){.col = l->col[i],
                     .row = l->row[j],
-                    .metres = rqt_unit_metres(&l->g->terrain->unit, l->block->q[at]),
-                    .valid = l->block->flags[at] & RQT_VALID,
+                    .metres = l->metres[at],
+                    .valid = l->what[at] & HAS_HEIGHT,
                     .i = i,
                     .j = j};
-}
-
-bool lattice_keeps(const lattice *l, size_t vertex) {
-    return l->block->error[vertex] > l->block->floor || (l->block->flags[vertex] & RQT_OUTLINE);
 }
 
 bool lattice_split(const lattice *l, const corner triangle[3], corner children[2][3]) {
     const corner *a = &triangle[0], *left = &triangle[1], *right = &triangle[2];
     const int i = left->i + right->i, j = left->j + right->j;
-    if (i % 2 || j % 2 || !lattice_keeps(l, (size_t)(j / 2) * (size_t)l->n + (size_t)(i / 2))) return false;
-    children[0][0] = children[1][0] = corner_at(l, i / 2, j / 2);
+    if (i % 2 || j % 2 || !(l->what[(size_t)(j / 2) * (size_t)l->n + (size_t)(i / 2)] & IS_SAMPLE)) return false;
+    children[0][0] = children[1][0] = lattice_corner(l, i / 2, j / 2);
     children[0][1] = *a;
     children[0][2] = *left;
     children[1][1] = *right;
@@ -97,35 +99,12 @@ bool lattice_split(const lattice *l, const corner triangle[3], corner children[2
  * side. */
 void lattice_halves(const lattice *l, const rqt_block_place *place, corner halves[2][3]) {
     const int last = l->n - 1;
-    const corner nw = corner_at(l, 0, 0), ne = corner_at(l, last, 0), sw = corner_at(l, 0, last),
-                 se = corner_at(l, last, last);
+    const corner nw = lattice_corner(l, 0, 0), ne = lattice_corner(l, last, 0), sw = lattice_corner(l, 0, last),
+                 se = lattice_corner(l, last, last);
     const bool is_main = (place->i + place->j) % 2 == 0;
     const corner all[2][3] = {{is_main ? ne : nw, is_main ? nw : sw, is_main ? se : ne},
                               {is_main ? sw : se, is_main ? se : ne, is_main ? nw : sw}};
     memcpy(halves, all, sizeof all);
-}
-
-/* Columns and rows of the block's lattice, and which pixels come next. */
-static void place_lattice(const rqt_block_place *p, lattice *l) {
-    const pixel_grid *g = l->g;
-    const int32_t last_col = g->terrain->lattice.width - 1, last_row = g->terrain->lattice.height - 1;
-    int i = 0, j = 0;
-    for (int n = 0; n < l->n; n++) {
-        const int64_t by = (int64_t)n * p->stride, col = p->x + by, row = p->y + by;
-        l->col[n] = (double)(col < last_col ? col : last_col);
-        l->row[n] = (double)(row < last_row ? row : last_row);
-        while (i < GRID && g->col[i] < l->col[n] - SLACK) i++;
-        while (j < GRID && g->row[j] < l->row[n] - SLACK) j++;
-        l->first_col[n] = i;
-        l->first_row[n] = j;
-    }
-}
-
-int lattice_read(tiles *t, const rqt_block_place *place, rqt_block_number number, lattice *l, char **error) {
-    const int code = store_read_block(t->store, t->terrain, number, &l->block, error);
-    l->n = (1 << t->terrain->k) + 1;
-    if (code == SQLITE_OK) place_lattice(place, l);
-    return code;
 }
 
 static int visit_turn(tiles *t, int level, pixel_grid *g, int turn, visit_block *visit, void *context,
@@ -157,22 +136,18 @@ int lattice_visit(tiles *t, int level, pixel_grid *g, visit_block *visit, void *
 
 /* ------------------------------------------------------------------------------------------------ drawing -- */
 
-/* Pixels on a kept leaf get its height, if they have none. */
-static void draw_leaf(const lattice *l, const corner leaf[3]) {
+/* Pixels on the mesh get its height, if they have none. */
+static void draw_pixels(const lattice *l, const lattice_box *box) {
     pixel_grid *g = l->g;
-    const lattice_box b = lattice_box_of(leaf);
-    const double south = l->row[b.south] + SLACK;
-    plane p;
-    if (!triangle_plane(leaf, &p)) return;
-    for (int j = l->first_row[b.north]; j < GRID && g->row[j] <= south; j++) {
-        double west, east;
-        if (!triangle_span(leaf, g->row[j] - SLACK, g->row[j] + SLACK, &west, &east)) continue;
-        for (int i = l->first_col[b.west]; i < GRID && g->col[i] <= east + SLACK; i++) {
+    const lattice_box pixels = lattice_window_of(l, box).pixels;
+    for (int j = pixels.north; j <= pixels.south; j++)
+        for (int i = pixels.west; i <= pixels.east; i++) {
             int32_t *code = &g->code[j * GRID + i];
-            if (*code != UNKNOWN || g->col[i] < west - SLACK) continue;
-            *code = pixels_code(g, p.at + g->col[i] * p.by_col + g->row[j] * p.by_row);
+            double metres;
+            if (*code != UNKNOWN) continue;
+            if (lattice_height(l, l->at_col[i], l->at_row[j], l->fx[i], l->fy[j], &metres))
+                *code = pixels_code(g, metres);
         }
-    }
 }
 
 /* Pixels whose square meets a leaf that is not kept are void. Squares reach to the middle between pixels, and a
@@ -196,25 +171,14 @@ static void void_leaf(const lattice *l, const corner leaf[3]) {
     }
 }
 
-/* Is there a pixel in a triangle's box? */
-static bool has_pixel(const lattice *l, const corner triangle[3]) {
-    const lattice_box b = lattice_box_of(triangle);
-    const int i = l->first_col[b.west], j = l->first_row[b.north];
-    return i < GRID && j < GRID && l->g->col[i] <= l->col[b.east] + SLACK &&
-           l->g->row[j] <= l->row[b.south] + SLACK;
-}
-
-static void draw_triangle(const lattice *l, const corner triangle[3]) {
+static void void_triangle(const lattice *l, const corner triangle[3]) {
     corner children[2][3];
     plane p;
     if (lattice_misses(l, triangle)) return;
-    if (l->g->terrain->voids == 0 && !has_pixel(l, triangle)) return;
     if (lattice_split(l, triangle, children)) {
-        draw_triangle(l, children[0]);
-        draw_triangle(l, children[1]);
-    } else if (triangle[0].valid && triangle[1].valid && triangle[2].valid) {
-        draw_leaf(l, triangle);
-    } else if (triangle_plane(triangle, &p)) {
+        void_triangle(l, children[0]);
+        void_triangle(l, children[1]);
+    } else if (!(triangle[0].valid && triangle[1].valid && triangle[2].valid) && triangle_plane(triangle, &p)) {
         void_leaf(l, triangle);
     }
 }
@@ -224,18 +188,24 @@ static int draw_block(tiles *t, const rqt_block_place *place, rqt_block_number n
     lattice *l = context;
     corner halves[2][3];
     (void)turn;
-    const int code = lattice_read(t, place, number, l, error);
+    lattice_box box = {0, 1 << t->terrain->k, 0, 1 << t->terrain->k};
+    const int code = lattice_read(t, place, number, l, &box, error);
     if (code != SQLITE_OK) return code;
+    draw_pixels(l, &box);
+    if (!l->has_voids) return SQLITE_OK;
     lattice_halves(l, place, halves);
-    draw_triangle(l, halves[0]);
-    draw_triangle(l, halves[1]);
+    void_triangle(l, halves[0]);
+    void_triangle(l, halves[1]);
     return SQLITE_OK;
 }
 
 int leaves_draw(tiles *t, int shift, pixel_grid *g, char **error) {
     const int levels = t->terrain->lattice.K - t->terrain->k, level = levels > shift ? levels - shift : 0;
-    lattice l = {.g = g};
-    int code = lattice_visit(t, level, g, draw_block, &l, error);
+    lattice *l = sqlite3_malloc64(sizeof *l);
+    if (!l) return SQLITE_NOMEM;
+    l->g = g;
+    int code = lattice_visit(t, level, g, draw_block, l, error);
+    sqlite3_free(l);
     pixels_close(g);
     if (code == SQLITE_OK) code = leaves_prove(t, level, g, error);
     return code;

@@ -1,42 +1,54 @@
 /* terrarium_proof.c - how far every sample is from what clients draw, without looking at every sample.
  *
- * Let B be what is drawn. A sample in a triangle T of the mesh is no further from it than e + sup over T of
- * |plane(T) - B|, where e is em of the block for a leaf (terrarium_leaves.c), and for a triangle that is split the
- * error of its split vertex, which is no less than that of any sample in it. Instead of B we look at B', which has
- * the same pixels and is bilinear between them in longitude and latitude: on a strip between two rows of pixels the
- * share of the lower row differs by at most
+ * Let B be what is drawn. A valid sample in a leaf with three valid corners is no further from it than e + sup |F -
+ * B|, e being em of the block (terrarium_leaves.c) and F the mesh. Instead of B we look at B', which has the same
+ * pixels and is bilinear between them in longitude and latitude: on a strip between two rows of pixels the share of
+ * the lower row differs by at most
  *
  *     h^2 max|M''| / (8 (M1 - M0)),       M the Mercator ordinate, M'' = sin(phi) / cos(phi)^2, h its height
  *
- * which, times what the two rows differ by, is `bent`. On what T has in common with a cell of four pixels, plane -
- * B' is k u v + linear in the cell's own u, v: a saddle, without extremes inside. So its extremes lie on the
- * border. On sides that run along u or v it is linear, so that they are at ends: at corners of T, at places where
- * sides of T cross lines of pixels, or at pixels. On sides that slant it is a parabola, at most |k du dv| / 4 from
- * the chord. So it is enough to walk along the sides of T from line to line, and to look at the pixels in it.
+ * which, times what the two rows differ by, is `bent`.
+ *
+ * F in place of the mesh of two triangles is in each cell of the lattice its bilinear Q, from which they are at
+ * most |nw - ne - sw + se| / 4 (`twist`). Q - B' is bilinear wherever a cell of the lattice and a cell of pixels
+ * have something in common, a rectangle, and so has its extremes at that one's corners: vertices, pixels, and where
+ * lines of the lattice cross lines of pixels. These are few loops over arrays. Half cells whose other half has no
+ * height, and leaves that reach beyond the raster, are no such cells: they are looked at as triangles. There plane
+ * - B' has no extremes inside a cell of pixels either, being a saddle; on sides that slant it is a parabola, at
+ * most |k du dv| / 4 from the chord. So it is enough to walk along the sides from line to line, and to look at the
+ * pixels inside.
  *
  * Only the largest sum counts, and how large it is at least is known: vertices are samples. So this is a branch and
- * bound, as in core/update_bound. A triangle of a sum that is no more than TIGHT times what was seen at vertices is
- * done with; any other is split; and a block in which a leaf has a larger sum gives way to its children, whose em
- * are smaller, down to stride 1, where there is nothing but vertices. Few blocks do. When it is noise, and there
- * would be many, we stop after MOST_SPLITS, and what is told is larger than need be.
+ * bound, as in core/update_bound: of the boxes of blocks the one with the largest sum gives way to its children,
+ * whose em are smaller, down to stride 1, where there is nothing but vertices; until that sum is no more than TIGHT
+ * times what was seen at vertices. Few boxes do. When it is noise, and there would be many, we stop after
+ * MOST_SPLITS, and what is told is larger than need be.
+ *
+ * In a child samples may be in leaves without a height though they are in one with three corners of its parent's:
+ * then what was found for the parent holds.
  */
 #include "terrarium_leaves.h"
 
 #include <math.h>
-#include <string.h>
 
 #define DEGREE 0.017453292519943295
 #define ROUNDED 1e-4 /* metres: what doubles and SLACK are */
 #define TIGHT 1.25
-enum { MOST_SPLITS = 48, FEW_PIXELS = 8 };
+enum { MOST_SPLITS = 1200, BOX = 8 };
+
+/* A box of a block, BOX cells a side, or all of a smaller block; and what is known of the samples in it. */
+typedef struct part {
+    rqt_block_number number;
+    int turn, x, y; /* first column and row */
+    double bound;
+} part;
 
 typedef struct proof {
     lattice l;
-    double seen;  /* of |sample - B'| at vertices, in all blocks so far */
-    double bound; /* of all samples in triangles that are done with */
-    double worst; /* of the block at hand; < 0: nothing of it is between pixels of terrain */
+    double seen; /* of |sample - B'| at vertices, in all blocks so far */
+    part *parts; /* a heap: none has a larger bound than the one at half its place */
+    size_t count, room;
     int splits;
-    bool may_split; /* the block at hand, and so need not be measured to the end */
 } proof;
 
 /* ---------------------------------------------------------------------------------------------- triangles -- */
@@ -86,142 +98,276 @@ static bool is_needed(const pixel_grid *g, int i, int j) {
            (i > 0 && j > 0 && g->is_whole[at - GRID - 1]);
 }
 
-/* sup over a triangle of |plane - B'|, likewise; where it is more than `most_wanted`, anything above that. */
-static double measure_triangle(const lattice *l, const corner triangle[3], double most_wanted) {
+/* sup over a triangle of |plane - B'|. */
+static double measure_triangle(const lattice *l, const corner triangle[3]) {
     const pixel_grid *g = l->g;
     const lattice_box b = lattice_box_of(triangle);
     const double south = l->row[b.south] + SLACK;
     double most = -1;
     plane p;
     if (!triangle_plane(triangle, &p)) return -1;
-    for (int a = 0; a < 3 && most <= most_wanted; a++) {
-        const double off = measure_side(l, &triangle[a], &triangle[a == 2 ? 0 : a + 1]);
-        if (off > most) most = off;
-    }
-    if (most > most_wanted) return most;
+    for (int a = 0; a < 3; a++) most = fmax(most, measure_side(l, &triangle[a], &triangle[a == 2 ? 0 : a + 1]));
     for (int j = l->first_row[b.north]; j < GRID && g->row[j] <= south; j++) {
         double west, east;
         if (!triangle_span(triangle, g->row[j] - SLACK, g->row[j] + SLACK, &west, &east)) continue;
         for (int i = l->first_col[b.west]; i < GRID && g->col[i] <= east + SLACK; i++) {
             const size_t at = (size_t)j * GRID + (size_t)i;
             if (!is_needed(g, i, j) || g->col[i] < west - SLACK) continue;
-            const double off = fabs(p.at + g->col[i] * p.by_col + g->row[j] * p.by_row - g->height[at]);
-            if (off > most) most = off;
+            most = fmax(most, fabs(p.at + g->col[i] * p.by_col + g->row[j] * p.by_row - g->height[at]));
         }
     }
     return most;
 }
 
-static bool is_small(const lattice *l, const corner triangle[3]) {
+/* Leaves of which the cells of the lattice are not parts; has_holes: one has no height. */
+static double measure_straddling(const lattice *l, const rqt_block_place *place, const lattice_box *box,
+                                 const corner triangle[3], bool *has_holes) {
     const lattice_box b = lattice_box_of(triangle);
-    return l->first_col[b.east] - l->first_col[b.west] <= FEW_PIXELS &&
-           l->first_row[b.south] - l->first_row[b.north] <= FEW_PIXELS;
+    corner children[2][3];
+    if (b.west >= box->east || b.east <= box->west || b.north >= box->south || b.south <= box->north) return -1;
+    if (lattice_misses(l, triangle) || !lattice_straddles(l, place, triangle)) return -1;
+    if (lattice_split(l, triangle, children))
+        return fmax(measure_straddling(l, place, box, children[0], has_holes),
+                    measure_straddling(l, place, box, children[1], has_holes));
+    if (triangle[0].valid && triangle[1].valid && triangle[2].valid) return measure_triangle(l, triangle);
+    *has_holes = true;
+    return -1;
 }
 
-/* False: the block is to be split. */
-static bool prove_triangle(proof *p, const corner triangle[3]) {
-    const lattice *l = &p->l;
-    const double enough = TIGHT * p->seen;
-    const bool is_valid = triangle[0].valid && triangle[1].valid && triangle[2].valid;
-    corner children[2][3];
-    if (lattice_misses(l, triangle)) return true;
-    if (!lattice_split(l, triangle, children)) {
-        if (!is_valid) return true;
-        const double off = measure_triangle(l, triangle, HUGE_VAL);
-        if (off >= 0) p->worst = fmax(p->worst, off + rqt_code_metres(l->block->floor));
-        return !p->may_split || p->worst <= enough;
+/* The half of a cell that has a height though the other has none. */
+static double measure_half(const lattice *l, int x, int y) {
+    const corner all[4] = {lattice_corner(l, x, y), lattice_corner(l, x + 1, y), lattice_corner(l, x, y + 1),
+                           lattice_corner(l, x + 1, y + 1)};
+    const bool is_main = (x + y + l->turned) % 2 == 0;
+    for (int half = 0; half < 2; half++) {
+        const corner triangle[3] = {all[is_main ? 0 : 1], all[is_main ? 3 : 2], all[is_main ? 1 + half : 3 * half]};
+        if (triangle[0].valid && triangle[1].valid && triangle[2].valid) return measure_triangle(l, triangle);
     }
-    const corner *middle = &children[0][0];
-    const double error = rqt_code_metres(l->block->error[(size_t)middle->j * (size_t)l->n + (size_t)middle->i]);
-    if (is_valid && error < enough && is_small(l, triangle)) {
-        const double off = measure_triangle(l, triangle, enough - error);
-        if (off + error <= enough) {
-            if (off >= 0) p->worst = fmax(p->worst, off + error);
-            return true;
-        }
-    }
-    return prove_triangle(p, children[0]) && prove_triangle(p, children[1]);
+    return -1;
 }
 
 /* ------------------------------------------------------------------------------------------------- blocks -- */
 
-/* The pixel before a place of the lattice, of those that come next; -1 or GRID - 1: there is no cell. */
-static int cell_of(int first, const double *pixels, double place) {
-    return first < GRID && pixels[first] <= place ? first : first - 1;
+/* Is a vertex on the border of a cell of pixels that is whole, its own being not? */
+static bool is_beside(const pixel_grid *g, size_t at, double u, double v) {
+    const bool is_left = u == 0 && at > 0, is_up = v == 0 && at >= GRID;
+    return (is_left && g->is_whole[at - 1]) || (is_up && g->is_whole[at - GRID]) ||
+           (is_left && is_up && at > GRID && g->is_whole[at - GRID - 1]);
 }
 
-/* What the vertices of the block at hand are off. */
-static double see(const lattice *l) {
+/* What vertices are off: all of them, and those that are samples. */
+static double see(const lattice *l, const lattice_window *w, double *seen) {
     const pixel_grid *g = l->g;
-    const rqt_block *block = l->block;
-    const rqt_unit *unit = &g->terrain->unit;
-    const double scale = rqt_unit_factor(unit) / unit->d, zero = rqt_unit_metres(unit, 0);
-    int cell[MOST_SIDE], from = l->n, to = 0;
-    double u[MOST_SIDE], most = -1;
-    for (int x = 0; x < l->n; x++) {
-        cell[x] = cell_of(l->first_col[x], g->col, l->col[x]);
-        if (cell[x] < 0 || cell[x] >= GRID - 1) continue;
-        u[x] = (l->col[x] - g->col[cell[x]]) * g->per_col;
-        if (x < from) from = x;
-        to = x + 1;
+    double most = -1, most_samples = *seen;
+    for (int y = w->lines.north; y <= w->lines.south; y++) {
+        const size_t row = (size_t)l->cell_row[y] * GRID, first = (size_t)y * (size_t)l->n;
+        const double v = l->v[y];
+        for (int x = w->lines.west; x <= w->lines.east; x++) {
+            const size_t at = row + (size_t)l->cell_col[x], vertex = first + (size_t)x;
+            if (!(l->what[vertex] & HAS_HEIGHT)) continue;
+            if (!g->is_whole[at] && !is_beside(g, at, l->u[x], v)) continue;
+            const double off = fabs(pixels_between(g, at, l->u[x], v) - l->metres[vertex]);
+            if (off > most) most = off;
+            if (off > most_samples && (l->what[vertex] & IS_SAMPLE)) most_samples = off;
+        }
     }
-    for (int y = 0; y < l->n; y++) {
-        const int j = cell_of(l->first_row[y], g->row, l->row[y]);
-        if (j < 0 || j >= GRID - 1) continue;
-        const double v = (l->row[y] - g->row[j]) * g->per_row[j];
-        const size_t first = (size_t)y * (size_t)l->n, row = (size_t)j * GRID;
-        for (int x = from; x < to; x++) {
-            const size_t vertex = first + (size_t)x, at = row + (size_t)cell[x];
-            if (block->sparse && block->error[vertex] <= block->floor && !(block->flags[vertex] & RQT_OUTLINE))
-                continue;
-            if (!(block->flags[vertex] & RQT_VALID) || !g->is_whole[at]) continue;
-            const double off = fabs(pixels_between(g, at, u[x], v) - (block->q[vertex] * scale + zero));
+    *seen = most_samples;
+    return most;
+}
+
+/* Rows of the lattice where columns of pixels cross them. */
+static double measure_rows(const lattice *l, const lattice_window *w) {
+    const pixel_grid *g = l->g;
+    double most = -1;
+    for (int y = w->lines.north; y <= w->lines.south; y++) {
+        const size_t row = (size_t)l->cell_row[y] * GRID;
+        const double *h = l->metres + (size_t)y * (size_t)l->n, v = l->v[y];
+        const uint8_t *what = l->what + (size_t)y * (size_t)l->n;
+        for (int i = w->pixels.west; i <= w->pixels.east; i++) {
+            const int x = l->at_col[i];
+            const size_t at = row + (size_t)i;
+            if (!(what[x] & what[x + 1] & HAS_HEIGHT)) continue;
+            if (!g->is_whole[at] && !(i > 0 && g->is_whole[at - 1])) continue;
+            const double drawn = g->height[at] + v * (g->height[at + GRID] - g->height[at]);
+            const double off = fabs(h[x] + l->fx[i] * (h[x + 1] - h[x]) - drawn);
             if (off > most) most = off;
         }
     }
     return most;
 }
 
-static int see_block(tiles *t, const rqt_block_place *place, rqt_block_number number, int turn, void *context,
-                     char **error) {
-    proof *p = context;
-    (void)turn;
-    const int code = lattice_read(t, place, number, &p->l, error);
-    if (code == SQLITE_OK) p->seen = fmax(p->seen, see(&p->l));
-    return code;
+/* Rows of pixels where columns of the lattice cross them. */
+static double measure_cols(const lattice *l, const lattice_window *w) {
+    const pixel_grid *g = l->g;
+    double most = -1;
+    for (int j = w->pixels.north; j <= w->pixels.south; j++) {
+        const size_t up = (size_t)l->at_row[j] * (size_t)l->n, down = up + (size_t)l->n, row = (size_t)j * GRID;
+        const double *h = l->metres, fy = l->fy[j];
+        for (int x = w->lines.west; x <= w->lines.east; x++) {
+            const size_t at = row + (size_t)l->cell_col[x], a = up + (size_t)x, b = down + (size_t)x;
+            if (!(l->what[a] & l->what[b] & HAS_HEIGHT)) continue;
+            if (!g->is_whole[at] && !(j > 0 && g->is_whole[at - GRID])) continue;
+            const double drawn = g->height[at] + l->u[x] * (g->height[at + 1] - g->height[at]);
+            const double off = fabs(h[a] + fy * (h[b] - h[a]) - drawn);
+            if (off > most) most = off;
+        }
+    }
+    return most;
 }
 
-static int prove_block(tiles *t, const rqt_block_place *place, rqt_block_number number, int turn, void *context,
-                       char **error);
+static double measure_pixels(const lattice *l, const lattice_window *w) {
+    const pixel_grid *g = l->g;
+    double most = -1;
+    for (int j = w->pixels.north; j <= w->pixels.south; j++) {
+        for (int i = w->pixels.west; i <= w->pixels.east; i++) {
+            const size_t at = (size_t)j * GRID + (size_t)i;
+            double metres;
+            if (g->code[at] == NO_HEIGHT || !is_needed(g, i, j)) continue;
+            if (!lattice_height(l, l->at_col[i], l->at_row[j], l->fx[i], l->fy[j], &metres)) continue;
+            const double off = fabs(metres - g->height[at]);
+            if (off > most) most = off;
+        }
+    }
+    return most;
+}
 
-static int prove_children(tiles *t, const rqt_block_place *place, int turn, proof *p, char **error) {
-    int code = SQLITE_OK;
-    p->splits++;
-    for (int what = 0; what < 2; what++)
-        for (int c = 0; c < 4 && code == SQLITE_OK; c++) {
-            const rqt_block_number number =
-                rqt_block_number_of(place->level + 1, 2 * place->i + (c & 1), 2 * place->j + (c >> 1));
-            rqt_block_place child;
-            if (rqt_block_locate(&t->terrain->lattice, t->terrain->k, number, &child) != RQT_OK) continue;
-            code = (what ? prove_block : see_block)(t, &child, number, turn, p, error);
+/* Does a cell of the lattice meet one of pixels that is whole? */
+static bool is_drawn(const lattice *l, int x, int y) {
+    const int west = l->first_col[x] - 1, north = l->first_row[y] - 1;
+    for (int j = north < 0 ? 0 : north; j < l->first_row[y + 1]; j++)
+        for (int i = west < 0 ? 0 : west; i < l->first_col[x + 1]; i++)
+            if (l->g->is_whole[j * GRID + i]) return true;
+    return false;
+}
+
+/* Cells of the lattice: a quarter of the largest twist; what is no whole cell; and whether samples may be there
+ * that are between pixels, but in leaves without a height. */
+static double measure_cells(const lattice *l, const lattice_box *box, double *twist, bool *has_holes) {
+    const pixel_grid *g = l->g;
+    double most = -1;
+    *twist = 0;
+    *has_holes = false;
+    for (int y = box->north; y < box->south; y++) {
+        if (l->row[y + 1] == l->row[y] || l->row[y + 1] < g->row[0] || l->row[y] > g->row[GRID - 1]) continue;
+        for (int x = box->west; x < box->east; x++) {
+            const size_t nw = (size_t)y * (size_t)l->n + (size_t)x, sw = nw + (size_t)l->n;
+            const double *h = l->metres;
+            if (l->what[nw] & l->what[nw + 1] & l->what[sw] & l->what[sw + 1] & HAS_HEIGHT) {
+                const double here = fabs(h[nw] - h[nw + 1] - h[sw] + h[sw + 1]);
+                if (here > *twist) *twist = here;
+            } else if (l->col[x + 1] > l->col[x] && is_drawn(l, x, y)) {
+                *has_holes = true;
+                most = fmax(most, measure_half(l, x, y));
+            }
+        }
+    }
+    *twist /= 4;
+    return most;
+}
+
+/* sup |F - B'|; at_vertices is it at vertices. */
+static double measure(const lattice *l, const rqt_block_place *place, const lattice_box *box,
+                      const lattice_window *w, double at_vertices, bool *has_holes) {
+    corner halves[2][3];
+    double twist;
+    const double triangles = measure_cells(l, box, &twist, has_holes);
+    const double at_pixels = measure_pixels(l, w);
+    const double at_corners = fmax(fmax(at_vertices, at_pixels < 0 ? -1 : at_pixels + twist),
+                                   fmax(measure_cols(l, w), measure_rows(l, w)));
+    const double most = fmax(at_corners < 0 ? -1 : at_corners + twist, triangles);
+    double beyond = -1;
+    if (l->is_squeezed) {
+        lattice_halves(l, place, halves);
+        for (int i = 0; i < 2; i++) beyond = fmax(beyond, measure_straddling(l, place, box, halves[i], has_holes));
+    }
+    return fmax(most, beyond);
+}
+
+/* -------------------------------------------------------------------------------------- branch and bound -- */
+
+static int put(proof *p, part new) {
+    if (p->count == p->room) {
+        const size_t room = p->room ? 2 * p->room : 256;
+        part *parts = sqlite3_realloc64(p->parts, room * sizeof *parts);
+        if (!parts) return SQLITE_NOMEM;
+        p->parts = parts;
+        p->room = room;
+    }
+    size_t at = p->count++;
+    for (; at > 0 && p->parts[(at - 1) / 2].bound < new.bound; at = (at - 1) / 2)
+        p->parts[at] = p->parts[(at - 1) / 2];
+    p->parts[at] = new;
+    return SQLITE_OK;
+}
+
+/* The one of the largest bound. There is one. */
+static part take(proof *p) {
+    const part largest = p->parts[0], last = p->parts[--p->count];
+    size_t at = 0;
+    for (size_t below = 1; below < p->count; below = 2 * at + 1) {
+        if (below + 1 < p->count && p->parts[below + 1].bound > p->parts[below].bound) below++;
+        if (p->parts[below].bound <= last.bound) break;
+        p->parts[at] = p->parts[below];
+        at = below;
+    }
+    p->parts[at] = last;
+    return largest;
+}
+
+static int box_side(const lattice *l) {
+    return l->n - 1 < BOX ? l->n - 1 : BOX;
+}
+
+/* A box of the block at hand. If it is of stride 1, all of its samples are seen and it is done with. */
+static int add(const rqt_block_place *place, part here, const lattice_box *box, double inherited, proof *p) {
+    const lattice *l = &p->l;
+    const lattice_window w = lattice_window_of(l, box);
+    const double at_vertices = see(l, &w, &p->seen);
+    if (place->stride == 1) return SQLITE_OK;
+    bool has_holes;
+    const double off = measure(l, place, box, &w, at_vertices, &has_holes);
+    here.bound = off < 0 ? -1 : off + l->floor;
+    if (has_holes && inherited > here.bound) here.bound = inherited;
+    return here.bound < 0 ? SQLITE_OK : put(p, here);
+}
+
+static int add_block(tiles *t, const rqt_block_place *place, rqt_block_number number, int turn, void *context,
+                     char **error) {
+    proof *p = context;
+    const int last = 1 << t->terrain->k;
+    lattice_box all = {0, last, 0, last};
+    int code = lattice_read(t, place, number, &p->l, &all, error);
+    if (code != SQLITE_OK) return code;
+    const int side = box_side(&p->l);
+    for (int y = all.north / side * side; y < all.south && code == SQLITE_OK; y += side)
+        for (int x = all.west / side * side; x < all.east && code == SQLITE_OK; x += side) {
+            const lattice_box box = {x < all.west ? all.west : x, x + side > all.east ? all.east : x + side,
+                                     y < all.north ? all.north : y, y + side > all.south ? all.south : y + side};
+            code = add(place, (part){.number = number, .turn = turn, .x = x, .y = y}, &box, -1, p);
         }
     return code;
 }
 
-static int prove_block(tiles *t, const rqt_block_place *place, rqt_block_number number, int turn, void *context,
-                       char **error) {
-    proof *p = context;
-    corner halves[2][3];
-    if (place->stride == 1) return SQLITE_OK; /* all of its samples were seen */
-    const int code = lattice_read(t, place, number, &p->l, error);
-    if (code != SQLITE_OK) return code;
-    lattice_halves(&p->l, place, halves);
-    p->worst = -1;
-    p->may_split = p->splits < MOST_SPLITS;
-    if (!prove_triangle(p, halves[0]) || !prove_triangle(p, halves[1]))
-        return prove_children(t, place, turn, p, error);
-    p->bound = fmax(p->bound, p->worst);
-    return SQLITE_OK;
+/* The same place in the next finer level: four boxes. */
+static int split(tiles *t, part parent, proof *p, char **error) {
+    const rqt_lattice *all = &t->terrain->lattice;
+    rqt_block_place place, child;
+    int code = SQLITE_OK;
+    p->splits++;
+    if (rqt_block_locate(all, t->terrain->k, parent.number, &place) != RQT_OK) return SQLITE_OK;
+    pixels_turn(p->l.g, parent.turn);
+    for (int c = 0; c < 4 && code == SQLITE_OK; c++) {
+        const int cells = p->l.n - 1, side = box_side(&p->l);
+        const int x = 2 * parent.x + (c & 1) * side, y = 2 * parent.y + (c >> 1) * side;
+        const rqt_block_number number =
+            rqt_block_number_of(place.level + 1, 2 * place.i + x / cells, 2 * place.j + y / cells);
+        if (rqt_block_locate(all, t->terrain->k, number, &child) != RQT_OK) continue;
+        const part here = {.number = number, .turn = parent.turn, .x = x % cells, .y = y % cells};
+        lattice_box box = {here.x, here.x + side, here.y, here.y + side};
+        code = lattice_read(t, &child, number, &p->l, &box, error);
+        if (code == SQLITE_OK) code = add(&child, here, &box, parent.bound, p);
+    }
+    return code;
 }
 
 /* The most that B and B' differ by. */
@@ -247,10 +393,17 @@ static double find_bent(const pixel_grid *g) {
 int leaves_prove(tiles *t, int level, pixel_grid *g, char **error) {
     proof *p = sqlite3_malloc64(sizeof *p);
     if (!p) return SQLITE_NOMEM;
-    *p = (proof){.l = {.g = g}};
-    int code = lattice_visit(t, level, g, see_block, p, error);
-    if (code == SQLITE_OK) code = lattice_visit(t, level, g, prove_block, p, error);
-    g->error = fmax(p->bound, p->seen) + find_bent(g) + t->terrain->quantum_error + ROUNDED;
+    p->l.g = g;
+    p->seen = 0;
+    p->parts = NULL;
+    p->count = p->room = 0;
+    p->splits = 0;
+    int code = lattice_visit(t, level, g, add_block, p, error);
+    while (code == SQLITE_OK && p->count > 0 && p->splits < MOST_SPLITS && p->parts[0].bound > TIGHT * p->seen)
+        code = split(t, take(p), p, error);
+    g->error =
+        fmax(p->count > 0 ? p->parts[0].bound : 0, p->seen) + find_bent(g) + t->terrain->quantum_error + ROUNDED;
+    sqlite3_free(p->parts);
     sqlite3_free(p);
     return code;
 }

@@ -68,6 +68,13 @@ geo_extent tiles_extent(const store_terrain *t) {
                         .highest = fmax(low, high)};
 }
 
+char *tiles_attribution(const store_terrain *t) {
+    char *text = sqlite3_mprintf("%s", t->source);
+    for (char *p = text; p && *p; p++)
+        if (*p == '\n') *p = p[1] ? ' ' : 0;
+    return text;
+}
+
 int tiles_print(cJSON *document, tile_bytes *out) {
     char *text = cJSON_PrintUnformatted(document);
     const size_t size = text ? strlen(text) : 0;

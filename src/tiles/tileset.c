@@ -163,7 +163,7 @@ static void add_extras(const tiles *t, cJSON *tileset) {
     const block_plan *plan = block_plan_of(t);
     double errors[TILES_LEVELS], steps[TILES_LEVELS];
     cJSON *extras = cJSON_AddObjectToObject(cJSON_AddObjectToObject(tileset, "extras"), "rqt");
-    char *source = block_attribution(t->terrain);
+    char *source = tiles_attribution(t->terrain);
     cJSON_AddStringToObject(extras, "terrain", t->terrain->name);
     cJSON_AddStringToObject(extras, "attribution", source ? source : "");
     sqlite3_free(source);

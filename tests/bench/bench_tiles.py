@@ -12,6 +12,9 @@ heights, of which the outermost lie on the tile's sides; they are kept as height
 clients draw two triangles between four of them. Of GDAL's `average` (that program's default) and `bilinear` the one that is
 less off counts, tile by tile. Left out: its overviews, out of which it resamples coarse levels, its water mask, and its
 time. Only tiles that lie wholly in the raster are taken; where none does, there is no figure.
+
+Last the same of Terrarium: what is stated of some tiles, and what the samples in them, half a pixel from their sides and more, are off
+from bilinear interpolation of the pixels, as clients have it.
 """
 import gzip
 import http.client
@@ -51,7 +54,7 @@ def write(database, *options):
     before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
     subprocess.run([s.RQT, "tiles", database, "-o", folder, *options], check=True)
     seconds, after = time.perf_counter() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
-    sizes = [os.path.getsize(os.path.join(path, name)) for path, _, names in os.walk(folder) for name in names if name.endswith(".terrain")]
+    sizes = [os.path.getsize(os.path.join(path, name)) for path, _, names in os.walk(folder) for name in names if name.endswith((".terrain", ".png"))]
     print("  %-32s %6.2f s, %6.2f s of processors, %d tiles, %.0f a second, %.1f MB" %
           (" ".join(options), seconds, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, len(sizes), len(sizes) / seconds, sum(sizes) / 1e6))
     shutil.rmtree(folder)
@@ -207,6 +210,61 @@ def measure(database, placed, kept):
     db.close()
 
 
+class Maps:
+    """Terrarium: each level live, and the errors of some of its tiles."""
+
+    def __init__(self, database, placed):
+        service = subprocess.Popen([s.RQT, "serve", "--port", "0", database], stdout=subprocess.PIPE, text=True)
+        self.connection = http.client.HTTPConnection("127.0.0.1", int(service.stdout.readline().rsplit(":", 1)[1].strip("/\n")))
+        try:
+            levels = self.ask_levels()
+        finally:
+            service.terminate()
+            service.wait()
+        self.heights = gdal.Open(placed).ReadAsArray().astype(float)
+        print("  level  asked  first ms  again ms  (worst)    bytes  true m  stated m")
+        for z, names, first, again in levels:
+            errors = [self.errors(z, *name, body) for name, (_, body) in list(zip(names, first))[:MEASURED]]
+            print("  %5d %6d %9.2f %9.2f %8.2f %8.0f %7.2f %9.2f" %
+                  (z, len(names), statistics.median(t for t, _ in first), statistics.median(again), max(again), statistics.mean(len(body) for _, body in first), *max(errors)))
+
+    def ask(self, path):
+        start = time.perf_counter()
+        self.connection.request("GET", "/collections/large/tiles/terrarium/" + path)
+        body = self.connection.getresponse().read()
+        return 1000 * (time.perf_counter() - start), body
+
+    def ask_levels(self):
+        document, levels = json.loads(self.ask("tile.json")[1]), []
+        west, south, east, north = document["bounds"]
+        for z in range(document["minzoom"], document["maxzoom"] + 1):
+            x0, x1, y0, y1 = (int(share * 2**z) for share in ((west + 180) / 360, (east + 180) / 360, self.row(north), self.row(south)))
+            names = [(x, y) for y in range(y0, y1 + 1) for x in range(x0, x1 + 1)]
+            names = names[len(names) // 2:][:ASKED // 3]
+            first = [self.ask("%d/%d/%d.png" % (z, *name)) for name in names]
+            levels.append((z, names, first, [min(self.ask("%d/%d/%d.png" % (z, *name))[0] for _ in range(3)) for name in names]))
+        return levels
+
+    @staticmethod
+    def row(latitude):
+        """A share of the world's square, from the north."""
+        return (1 - numpy.arcsinh(numpy.tan(numpy.radians(latitude))) / numpy.pi) / 2
+
+    def errors(self, z, x, y, body):
+        gdal.FileFromMemBuffer("/vsimem/tile.png", body)
+        picture = gdal.Open("/vsimem/tile.png")
+        red, green, blue = picture.ReadAsArray().astype(float)
+        pixels, stated = red * 256 + green + blue / 256 - 32768, float(picture.GetMetadataItem("error_metres"))
+        index = numpy.arange(SIDE)
+        col, row = (((WEST + index * STEP + 180) / 360 * 2**z) - x) * 256 - 0.5, (self.row(NORTH - index * STEP) * 2**z - y) * 256 - 0.5
+        cols, rows = (col >= 0) & (col < 255), (row >= 0) & (row < 255)
+        i, j = numpy.floor(col[cols]).astype(int), numpy.floor(row[rows]).astype(int)
+        u, v = col[cols] - i, (row[rows] - j)[:, None]
+        four = [pixels[numpy.ix_(j + b, i + a)] for b in (0, 1) for a in (0, 1)]
+        off = numpy.abs((four[0] * (1 - u) + four[1] * u) * (1 - v) + (four[2] * (1 - u) + four[3] * u) * v - self.heights[numpy.ix_(rows, cols)])
+        return off[numpy.all([h != 0 for h in four], axis=0)].max(initial=0), stated
+
+
 path, source = terrain()
 print("A pyramid of %d x %d samples, written (aim: 6 s on two processors):" % (SIDE, SIDE))
 for arguments in (["--jobs", "1"], ["--jobs", "2"], ["--jobs", "2", "--gzip"]):
@@ -216,3 +274,6 @@ print("Live (aim: 5 ms again):")
 asked = ask_all(path)
 print("True error, above or below at every sample of the tiles (some of each level), beside grids of 65 x 65 heights of the same tiles:")
 measure(path, source, asked)
+print("Terrarium, for maps (aim: 5 ms again):")
+write(path, "--kind", "terrarium", "--jobs", "2")
+Maps(path, source)

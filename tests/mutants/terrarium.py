@@ -1,15 +1,16 @@
 """Mutants of the tiles for maps: see ../mutants.py."""
 
 TERRARIUM = "test_terrarium.py"
-KIND, PIXELS, SAMPLES, LEAVES, PROOF, PNG = ("src/tiles/terrarium%s.c" % name for name in ("", "_pixels", "_samples", "_leaves", "_proof", "_png"))
+KIND, PIXELS, SAMPLES, LATTICE, PROOF, PNG = ("src/tiles/terrarium%s.c" % name for name in ("", "_pixels", "_samples", "_lattice", "_proof", "_png"))
 SERVE = "src/serve/tiles.c"
 
 MUTANTS = [
     # the error
-    ("terrarium: leaves have no error of their own", PROOF, "off + rqt_code_metres(l->block->floor)", "off", TERRARIUM, "the stated error holds"),
-    ("terrarium: triangles that are done with have none", PROOF, "if (off >= 0) p->worst = fmax(p->worst, off + error);", "if (off >= 0 && off < 0) p->worst = error;", TERRARIUM, "the stated error holds"),
-    ("terrarium: blocks never give way to their children", PROOF, "MOST_SPLITS = 48", "MOST_SPLITS = 0", TERRARIUM, "times the true one"),
-    ("terrarium: children are not looked at", PROOF, "for (int what = 0; what < 2; what++)", "for (int what = 0; what < 0; what++)", TERRARIUM, "the stated error holds"),
+    ("terrarium: leaves have no error of their own", PROOF, "here.bound = off < 0 ? -1 : off + l->floor;", "here.bound = off;", TERRARIUM, "the stated error holds"),
+    ("terrarium: the smallest bound gives way first", PROOF, "p->parts[(at - 1) / 2].bound < new.bound;", "p->parts[(at - 1) / 2].bound > new.bound;", TERRARIUM, "the stated error holds"),
+    ("terrarium: boxes never give way to their children", PROOF, "MOST_SPLITS = 1200", "MOST_SPLITS = 0", TERRARIUM, "times the true one"),
+    ("terrarium: one child is not looked at", PROOF, "for (int c = 0; c < 4 && code == SQLITE_OK; c++) {", "for (int c = 0; c < 3 && code == SQLITE_OK; c++) {", TERRARIUM, "the stated error holds"),
+    ("terrarium: vertices in leaves are their western neighbours", LATTICE, "l->metres[before] + share_after * (l->metres[after] - l->metres[before]);", "l->metres[before];", TERRARIUM, "the stated error holds"),
     ("terrarium: all samples are not measured", SAMPLES, "if (off > most) most = off;", "if (off > most && y % 2) most = off;", TERRARIUM, "the stated error holds"),
     ("terrarium: rows of pixels are even in latitude", SAMPLES, "const double n = (top - next) / (2 * M_PI) * ldexp(PIXELS, g->z);",
      "const double n = (g->lat[0] - lat) / (g->lat[0] - g->lat[GRID - 1]) * (GRID - 1) + 0 * (top - next);", TERRARIUM, "the stated error holds"),

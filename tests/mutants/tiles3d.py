@@ -13,7 +13,7 @@ MUTANTS = [
     ("3d-tiles: a tile forgets its own errors", TILE, "rqt_code_metres(relief->error) + level->centre;", "level->centre;", TILES, "no sample is further"),
     ("3d-tiles: the last level leaves out what half a metre allows", MESH, ": tile.level == plan->finest ? error : sag;", ": sag;", TILES, "goes through every sample"),
     ("3d-tiles: every level states the first one's error", TILE, "block_plan_of(t)->level[tile.level];\n    const double own", "block_plan_of(t)->level[0];\n    const double own", TILES, "is not idle"),
-    ("3d-tiles: a level is off by what the one above is", PLAN, "fmax(em[l + FINER], own);", "fmax(em[l + FINER], own) * (l == 1 ? 8 : 1);", TILES, "no tile has a larger error"),
+    ("3d-tiles: a level is off by what the one above is", PLAN, "fmax(em[l + FINER], fmin(em[l], ground));", "fmax(em[l + FINER], fmin(em[l], ground)) * (l == 1 ? 8 : 1);", TILES, "no tile has a larger error"),
     ("3d-tiles: the root's error is its own", TILESET, "most = fmax(most, ldexp(", "most = fmax(most, ldexp(l > 0 ? 0 : 1, 0) * (", TILES, "halved level by level"),
     # seams
     ("3d-tiles: corners are not forced", MESH, "corner < 4 && status", "corner < 0 && status", TILES, "covers its cell"),
@@ -30,8 +30,9 @@ MUTANTS = [
     ("3d-tiles: regions are the geoid's", TILE, "region[5] = relief->highest + high + moved;", "region[5] = relief->highest + moved;", TILES, "geoid: tiles lie in their regions"),
     ("3d-tiles: longitudes go on beyond 180", TILE, "if (east > 180) east", "if (east > 1000) east", TILES, "regions are on the globe"),
     # availability
-    ("3d-tiles: every tile has content", TILE, "if (!relief->is_mixed) return SQLITE_OK;", "*has = true;\n    return SQLITE_OK;", TILES, "holes"),
-    ("3d-tiles: no mixed tile has content", TILE, "code = block_has_triangle(t, tile, part, has, error);", "code = SQLITE_OK;", TILES, "holes"),
+    ("3d-tiles: every tile has content", TILE, "return relief->is_mixed ? block_has_triangle(t, tile, has, error) : SQLITE_OK;", "const int code = relief->is_mixed ? block_has_triangle(t, tile, has, error) : SQLITE_OK;\n    *has = true;\n    return code;", TILES, "holes"),
+    ("3d-tiles: no mixed tile has content", TILE, "return relief->is_mixed ? block_has_triangle(t, tile, has, error) : SQLITE_OK;", "const int code = relief->is_mixed ? block_has_triangle(t, tile, has, error) : SQLITE_OK;\n    *has = *has && !relief->is_mixed;\n    return code;", TILES, "holes"),
+    ("3d-tiles: blocks without voids have nothing", MESH, "*has = cover == STORE_COVER_ALL;", "*has = cover == STORE_COVER_NOTHING;", TILES, "lone: a void"),
     ("3d-tiles: a cell without an outline is all valid", RELIEF, "relief->is_valid = summary->corner[0].flags & RQT_VALID;", "relief->is_valid = true;", TILES, "holes"),
     ("3d-tiles: bits are counted from the other end", SUBTREE, "(uint8_t)(1 << i % 8)", "(uint8_t)(128 >> i % 8)", TILES, "as the formats have them"),
     ("3d-tiles: x and y change places", SUBTREE, "x |= (m >> 2 * bit & 1) << bit;", "x |= (m >> (2 * bit + 1) & 1) << bit;", TILES, "as the formats have them"),

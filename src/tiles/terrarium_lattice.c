@@ -1,0 +1,204 @@
+/* terrarium_lattice.c - blocks as heights at all vertices of their lattice, and where those lie among the pixels.
+ *
+ * A leaf's plane, at the vertices in it, is what halving its sides again and again gives: so going from coarse to
+ * fine, a vertex that is not kept is the middle between the ends of the hypotenuse that it halves. Numbers are
+ * exact, being halves of halves of integers (until they become metres). A vertex so found has a height if both ends
+ * have one: in a leaf with a void corner these are at most those on the side that the other two corners have.
+ *
+ * Beyond the raster the lattice's vertices are squeezed onto the last column and row. Triangles that reach there
+ * have planes over squeezed corners, and the middle of a hypotenuse need not be on it: what it gets here is on one
+ * of the two triangles, and what the cells of the lattice make of it is about the mesh, not quite. It does for
+ * drawing, where any height will do; the proof looks at the triangles themselves.
+ */
+#include "terrarium_leaves.h"
+
+#include <math.h>
+
+/* The first pixel that is at a place or beyond. */
+static int next_pixel(const double *pixels, double place) {
+    int from = 0, to = GRID;
+    while (from < to) {
+        const int middle = (from + to) / 2;
+        if (pixels[middle] < place - SLACK)
+            from = middle + 1;
+        else
+            to = middle;
+    }
+    return from;
+}
+
+/* Which pixels are next to the lattice's lines, from one to another: those at or beyond them, and the cells that
+ * they are in. */
+static void find_cells(const double *lines, int line, int last, const double *pixels, int *first, int *cells) {
+    int next = next_pixel(pixels, lines[line]);
+    for (; line <= last; line++) {
+        while (next < GRID && pixels[next] < lines[line] - SLACK) next++;
+        const int cell = next < GRID && pixels[next] <= lines[line] ? next : next - 1;
+        first[line] = next;
+        cells[line] = cell < GRID - 1 ? cell : -1;
+    }
+}
+
+/* The lines that are around the pixels, and one more on either side. */
+static void clip(const double *lines, const double *pixels, int *first, int *last) {
+    while (*first < *last && lines[*first + 1] < pixels[0]) ++*first;
+    while (*last > *first && lines[*last - 1] > pixels[GRID - 1]) --*last;
+}
+
+/* The lattice's lines among those of pixels. Triangles that reach beyond the raster may be larger than the box. */
+static void place_lattice(const rqt_block_place *p, lattice *l, lattice_box *box) {
+    const pixel_grid *g = l->g;
+    const int32_t last_col = g->terrain->lattice.width - 1, last_row = g->terrain->lattice.height - 1;
+    const int last = l->n - 1;
+    for (int n = 0; n <= last; n++) {
+        const int64_t by = (int64_t)n * p->stride, col = p->x + by, row = p->y + by;
+        l->col[n] = (double)(col < last_col ? col : last_col);
+        l->row[n] = (double)(row < last_row ? row : last_row);
+    }
+    clip(l->col, g->col, &box->west, &box->east);
+    clip(l->row, g->row, &box->north, &box->south);
+    l->is_squeezed = p->side > last_col - p->x || p->side > last_row - p->y;
+    const lattice_box placed = l->is_squeezed ? (lattice_box){0, last, 0, last} : *box;
+    find_cells(l->col, placed.west, placed.east, g->col, l->first_col, l->cell_col);
+    find_cells(l->row, placed.north, placed.south, g->row, l->first_row, l->cell_row);
+    for (int n = box->west; n <= box->east; n++) {
+        const int i = l->cell_col[n];
+        l->u[n] = i < 0 ? 0 : (l->col[n] - g->col[i]) * g->per_col;
+    }
+    for (int n = box->north; n <= box->south; n++) {
+        const int j = l->cell_row[n];
+        l->v[n] = j < 0 ? 0 : (l->row[n] - g->row[j]) * g->per_row[j];
+    }
+}
+
+/* ... and pixels from one to another between some of the lattice's: a line that is squeezed onto the one before has
+ * no cell. */
+static void find_pixels(const double *lines, int line, int last, const double *pixels, int first, int end, int *at,
+                        double *f) {
+    for (int i = first; i <= end; i++) {
+        while (line + 1 < last && lines[line + 1] < pixels[i] && lines[line + 2] > lines[line + 1]) line++;
+        at[i] = line;
+        f[i] = fmin(fmax((pixels[i] - lines[line]) / (lines[line + 1] - lines[line]), 0), 1);
+    }
+}
+
+static void find_lines(const int *cells, const double *lines, int *first, int *last) {
+    while (*first <= *last && cells[*first] < 0) ++*first;
+    while (*last >= *first && (cells[*last] < 0 || (*last > 0 && lines[*last] == lines[*last - 1]))) --*last;
+}
+
+lattice_window lattice_window_of(const lattice *l, const lattice_box *box) {
+    const pixel_grid *g = l->g;
+    lattice_window w = {
+        *box,
+        {l->first_col[box->west], l->first_col[box->east], l->first_row[box->north], l->first_row[box->south]}};
+    find_lines(l->cell_col, l->col, &w.lines.west, &w.lines.east);
+    find_lines(l->cell_row, l->row, &w.lines.north, &w.lines.south);
+    if (w.pixels.east == GRID || g->col[w.pixels.east] > l->col[box->east] + SLACK) w.pixels.east--;
+    if (w.pixels.south == GRID || g->row[w.pixels.south] > l->row[box->south] + SLACK) w.pixels.south--;
+    return w;
+}
+
+/* ---------------------------------------------------------------------------------------------- heights -- */
+
+/* Where b is between a and c, 0 .. 1. */
+static double share(double a, double b, double c) {
+    return c > a ? (b - a) / (c - a) : 0;
+}
+
+/* The middle of a square of the lattice, half its side away from each: on the two triangles that it is cut into. */
+static void fill_middle(lattice *l, int x, int y, int half, bool is_main) {
+    const size_t at = (size_t)y * (size_t)l->n + (size_t)x, up = (size_t)half * (size_t)l->n, by = (size_t)half;
+    const size_t nw = at - up - by, ne = at - up + by, sw = at + up - by, se = at + up + by;
+    const size_t a = is_main ? nw : ne, b = is_main ? se : sw;
+    double *h = l->metres;
+    l->what[at] = l->what[a] & l->what[b] & HAS_HEIGHT;
+    h[at] = (h[a] + h[b]) / 2;
+    if (!l->is_squeezed) return;
+    const double fx = share(l->col[x - half], l->col[x], l->col[x + half]),
+                 fy = share(l->row[y - half], l->row[y], l->row[y + half]);
+    if (is_main)
+        h[at] = fx > fy ? h[nw] + fx * (h[ne] - h[nw]) + fy * (h[se] - h[ne])
+                        : h[nw] + fy * (h[sw] - h[nw]) + fx * (h[se] - h[sw]);
+    else
+        h[at] = fx + fy < 1 ? h[nw] + fx * (h[ne] - h[nw]) + fy * (h[sw] - h[nw])
+                            : h[se] + (1 - fx) * (h[sw] - h[se]) + (1 - fy) * (h[ne] - h[se]);
+}
+
+static void fill_between(lattice *l, size_t at, size_t before, size_t after, double share_after) {
+    l->what[at] = l->what[before] & l->what[after] & HAS_HEIGHT;
+    l->metres[at] = l->metres[before] + share_after * (l->metres[after] - l->metres[before]);
+}
+
+/* Is a vertex kept? Then it has the sample's height. */
+static bool take_sample(lattice *l, size_t at) {
+    const rqt_block *block = l->block;
+    if (block->error[at] <= block->floor && !(block->flags[at] & RQT_OUTLINE) && block->sparse) return false;
+    l->metres[at] = block->q[at] * l->scale + l->zero;
+    l->what[at] = IS_SAMPLE | (block->flags[at] & RQT_VALID ? HAS_HEIGHT : 0);
+    return true;
+}
+
+/* The vertices inside the squares of side 2 half that meet the box; half their side away from their borders. */
+static void fill_squares(lattice *l, const lattice_box *box, int half, bool is_main) {
+    const int n = l->n, size = 2 * half;
+    const int west = box->west / size * size, north = box->north / size * size;
+    const int east = (box->east + size - 1) / size * size, south = (box->south + size - 1) / size * size;
+    for (int y = north + half; y < south; y += size)
+        for (int x = west + half; x < east; x += size)
+            if (!take_sample(l, (size_t)y * (size_t)n + (size_t)x))
+                fill_middle(l, x, y, half, size == n - 1 ? is_main : (x / size + y / size) % 2 == 0);
+    for (int y = north; y <= south; y += half) {
+        const bool is_across = y / half % 2 == 0;
+        const double down =
+            is_across || !l->is_squeezed ? 0.5 : share(l->row[y - half], l->row[y], l->row[y + half]);
+        const size_t by = is_across ? (size_t)half : (size_t)half * (size_t)n;
+        for (int x = is_across ? west + half : west; x <= east; x += size) {
+            const size_t at = (size_t)y * (size_t)n + (size_t)x;
+            if (take_sample(l, at)) continue;
+            fill_between(l, at, at - by, at + by,
+                         is_across && l->is_squeezed ? share(l->col[x - half], l->col[x], l->col[x + half]) : down);
+        }
+    }
+}
+
+static void fill(lattice *l, const lattice_box *box, bool has_all, bool is_main) {
+    const rqt_unit *unit = &l->g->terrain->unit;
+    const rqt_block *block = l->block;
+    const size_t n = (size_t)l->n, corners[4] = {0, n - 1, n * n - n, n * n - 1};
+    uint8_t valid = RQT_VALID;
+    l->scale = rqt_unit_factor(unit) / unit->d;
+    l->zero = rqt_unit_metres(unit, 0);
+    for (int i = 0; i < 4; i++) {
+        l->metres[corners[i]] = block->q[corners[i]] * l->scale + l->zero;
+        l->what[corners[i]] = IS_SAMPLE | (block->flags[corners[i]] & RQT_VALID ? HAS_HEIGHT : 0);
+        valid &= block->flags[corners[i]];
+    }
+    if (!has_all)
+        for (int half = (l->n - 1) / 2; half > 0; half /= 2) fill_squares(l, box, half, is_main);
+    for (int y = box->north; y <= box->south; y++)
+        for (int x = box->west; x <= box->east; x++) {
+            const size_t at = (size_t)y * n + (size_t)x;
+            valid &= block->flags[at];
+            if (!has_all) continue;
+            l->metres[at] = block->q[at] * l->scale + l->zero;
+            l->what[at] = IS_SAMPLE | (block->flags[at] & RQT_VALID ? HAS_HEIGHT : 0);
+        }
+    l->has_voids = !valid;
+}
+
+int lattice_read(tiles *t, const rqt_block_place *place, rqt_block_number number, lattice *l, lattice_box *box,
+                 char **error) {
+    const int code = store_read_block(t->store, t->terrain, number, &l->block, error);
+    if (code != SQLITE_OK) return code;
+    const bool is_main = (place->i + place->j) % 2 == 0, has_all = place->stride == 1;
+    l->n = (1 << t->terrain->k) + 1;
+    l->turned = l->n == 2 && !is_main;
+    l->floor = has_all ? 0 : rqt_code_metres(l->block->floor);
+    place_lattice(place, l, box);
+    fill(l, box, has_all, is_main);
+    const lattice_box pixels = lattice_window_of(l, box).pixels;
+    find_pixels(l->col, box->west, box->east, l->g->col, pixels.west, pixels.east, l->at_col, l->fx);
+    find_pixels(l->row, box->north, box->south, l->g->row, pixels.north, pixels.south, l->at_row, l->fy);
+    return code;
+}
