@@ -86,6 +86,9 @@ class Tile:
         if highest != self.count:
             self.problem = "%d vertices are used, %d are there" % (highest, self.count)
         self.triangles = [self.triangles[i:i + 3] for i in range(0, len(self.triangles), 3)]
+        # Of one vertex each, where the tile has no terrain.
+        self.specks = [t[0] for t in self.triangles if t[0] == t[1] == t[2]]
+        self.triangles = [t for t in self.triangles if not t[0] == t[1] == t[2]]
         self.edges = [b.take("%d%s" % (b.take("I")[0], index)) for _ in range(4)]
         self.extensions = {}
         while b.at < len(data):
@@ -124,6 +127,37 @@ class Tile:
         """Twice the sum of the areas, signed, in units."""
         u, v = self.u, self.v
         return sum((u[b] - u[a]) * (v[c] - v[a]) - (u[c] - u[a]) * (v[b] - v[a]) for a, b, c in self.triangles)
+
+
+def clip(shape, axis, value, sign):
+    """The part of a convex polygon of rational numbers where sign * (coordinate - value) >= 0."""
+    part = []
+    for p, q in zip(shape, shape[1:] + shape[:1]):
+        a, b = sign * (p[axis] - value), sign * (q[axis] - value)
+        if a >= 0:
+            part.append(p)
+        if a * b < 0:
+            part.append(tuple(c + (d - c) * a / (a - b) for c, d in zip(p, q)))
+    return part
+
+
+def bare_middles(tile):
+    """The middles of the sixteenths about which no triangle comes within three eighths of a sixteenth's side."""
+    bare, side, reach = [], 8192, 3072
+    for v in range(side // 2, 4 * side, side):
+        for u in range(side // 2, 4 * side, side):
+            for corners in tile.triangles:
+                shape = [(Fraction(tile.u[i]), Fraction(tile.v[i])) for i in corners]
+                if max(p[0] for p in shape) < u - reach or min(p[0] for p in shape) > u + reach or max(p[1] for p in shape) < v - reach or min(p[1] for p in shape) > v + reach:
+                    continue
+                for axis, middle in enumerate((u, v)):
+                    for sign in (1, -1):
+                        shape = clip(shape, axis, middle - sign * reach, sign)
+                if shape:
+                    break
+            else:
+                bare.append((u, v))
+    return bare
 
 
 def listed(layer):
@@ -325,7 +359,10 @@ def check_pyramid(p, is_whole, vertices_too=True):
         s.finish()
     s.equal(name + ": listed and there are the same tiles, each once", sorted(listed(p.layer)), sorted([*tiles, *p.empty]))
     roots = {t.x: t for t in [*every, *p.empty.values()] if t.z == 0}
-    s.equal(name + ": both tiles of level 0 are there, one without terrain is empty", (sorted(roots), [t.count for t in p.empty.values()]), ([0, 1], [0] * len(p.empty)))
+    s.equal(name + ": both tiles of level 0 are there, one without terrain has specks alone", (sorted(roots), [t.count for t in p.empty.values()]), ([0, 1], [16] * len(p.empty)))
+    s.equal(name + ": a speck where, and only where, no triangle comes near the middle of a sixteenth",
+            [(t.z, t.x, t.y) for t in [*every, *p.empty.values()] if [(t.u[i], t.v[i]) for i in t.specks] != bare_middles(t)], [])
+    s.check(name + ": ... at a height that the tile has", all(t.h[i] in t.h[:t.count - len(t.specks)] for t in every for i in t.specks))
     s.equal(name + ": ... and each tells of those below it, so that all that are there are told of", sorted(told_by(roots)), sorted(k for k in tiles if k[0] > 0))
     s.equal(name + ": ... as clients are told that they do", p.layer["metadataAvailability"], len(p.layer["available"]))
     s.equal(name + ": every tile has a triangle", [(t.z, t.x, t.y) for t in every if not t.triangles], [])
@@ -445,7 +482,7 @@ def count_vertices(p):
         for (level, x, y), t in p.tiles.items():
             if level != z:
                 continue
-            mine += t.count
+            mine += t.count - len(t.specks)
             cut, cover, space = (
                 s.one(db, "SELECT count(*) FROM rqt_range(rqt_bbox(?, ?, ?, ?), ?, NULL, ?)", t.west, t.south, t.west + t.side, t.south + t.side,
                       t.metadata["error"], json.dumps(dict(options, outline="tol")))

@@ -144,6 +144,17 @@ class Decoder {
         wide = n > 65536 ? 4 : 2;
         at += (wide - at % wide) % wide;
     }
+    /* Where it has no terrain a tile has triangles of one vertex, behind all others: nothing is to be seen of them.
+     */
+    void drop_specks() {
+        std::vector<uint32_t> &t = tile.triangles;
+        while (t.size() >= 3 && t[t.size() - 3] == t.back() && t[t.size() - 2] == t.back() &&
+               t.back() + 1 == tile.count()) {
+            t.resize(t.size() - 3);
+            for (std::vector<int> *list : {&tile.u, &tile.v, &tile.h}) list->pop_back();
+            if (tile.normals.size() >= 2) tile.normals.resize(tile.normals.size() - 2);
+        }
+    }
     void read_triangles() {
         const uint64_t n = 3 * (uint64_t)take<uint32_t>();
         if (!has(n, wide)) return;
@@ -178,6 +189,7 @@ class Decoder {
             if (id == 4) read_metadata(body);
         }
         if (tile.normals.size() != 2 * tile.count()) fail("normals for another number of vertices");
+        drop_specks();
         if (!tile.water.empty() && tile.water.size() != 1 && tile.water.size() != 65536)
             fail("a water mask of " + std::to_string(tile.water.size()) + " bytes");
         for (double d : {tile.geometric_error, tile.step})

@@ -34,7 +34,7 @@ const endpoint endpoints[] = {
     {"tileset", TERRAIN "/tiles/3d-tiles/tileset.json", " ", answer_tile_document, false},
     {"content", TERRAIN "/tiles/3d-tiles/content/{z}/{x}/{y}.glb", " v ", answer_tile, false},
     {"subtree", TERRAIN "/tiles/3d-tiles/subtrees/{z}/{x}/{y}.subtree", " v ", answer_tile, false},
-    {"cesium", "/cesium", " terrain ", answer_cesium, false},
+    {"cesium", "/cesium", " terrain tiles ", answer_cesium, false},
     {"terrarium", TERRAIN "/tiles/terrarium/tile.json", " ", answer_tile_document, false},
     {"terrarium_tile", TERRAIN "/tiles/terrarium/{z}/{x}/{y}.png", " v ", answer_tile, false},
     {"health", "/healthz", " ", answer_health, true},

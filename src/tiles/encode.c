@@ -8,7 +8,7 @@
  *     extensions  id (1 byte), length (4): 1 oct-encoded normals, 2 water mask (terrains with a sea), 4 metadata
  *
  * The cut has its vertices in the order of the triangles: each new one is the next, which is what the high-water
- * mark wants.
+ * mark wants. Specks follow (speck.c).
  */
 #include "quantized_mesh.h"
 
@@ -92,15 +92,18 @@ static void put_differences(writer *w, const uint16_t *values, size_t count) {
     }
 }
 
-static void put_triangles(writer *w, const rqt_cut *cut, size_t index) {
+static void put_triangles(writer *w, const tile_mesh *mesh, size_t index) {
+    const rqt_cut *cut = &mesh->cut;
     uint32_t highest = 0;
     while (w->size % index) put_number(w, 0, 1);
-    put_number(w, cut->triangle_count, 4);
+    put_number(w, cut->triangle_count + mesh->specks, 4);
     uint8_t *p = make_room(w, 3 * cut->triangle_count, index);
     for (size_t i = 0; p && i < 3 * cut->triangle_count; i++) {
         p = write_number(p, highest - cut->triangles[i], index);
         highest += cut->triangles[i] == highest;
     }
+    /* The next vertex, and itself again, twice. */
+    for (uint32_t i = 0; i < 3 * mesh->specks; i++) put_number(w, i % 3 > 0, index);
 }
 
 static void put_sides(writer *w, const tile_mesh *mesh, size_t index) {
@@ -111,8 +114,8 @@ static void put_sides(writer *w, const tile_mesh *mesh, size_t index) {
 }
 
 static int put_normals(writer *w, tiles *t, const tile_mesh *mesh, const tile_globe *globe, char **error) {
-    const size_t size = 2 * mesh->cut.vertex_count;
-    uint8_t *packed = sqlite3_malloc64(size + 1);
+    const size_t size = 2 * mesh_vertices(mesh);
+    uint8_t *packed = sqlite3_malloc64(size);
     const int code = packed ? globe_normals(t, mesh, globe, packed, error) : SQLITE_NOMEM;
     if (code == SQLITE_OK) {
         put_number(w, NORMALS, 1);
@@ -175,25 +178,24 @@ static int put_metadata(writer *w, tiles *t, const tile_place *place, const tile
 }
 
 int encode_tile(tiles *t, const tile_place *place, const tile_mesh *mesh, tile_bytes *out, char **error) {
-    const rqt_cut *cut = &mesh->cut;
-    const size_t index = cut->vertex_count > SMALL_INDICES ? 4 : 2;
+    const size_t count = mesh_vertices(mesh), index = count > SMALL_INDICES ? 4 : 2;
     tile_globe globe;
     int code = globe_make(mesh, &globe);
     if (code != SQLITE_OK) {
         globe_free(&globe);
         return code;
     }
-    writer w = {.capacity = 4096 + HEADER + 8 * cut->vertex_count + (3 * cut->triangle_count + 1024) * index};
+    writer w = {.capacity = 4096 + HEADER + 8 * count + (3 * mesh->cut.triangle_count + 1024) * index};
     w.bytes = sqlite3_malloc64(w.capacity);
     w.no_memory = !w.bytes;
     put_header(&w, plan_of(t), &globe);
-    put_number(&w, cut->vertex_count, 4);
-    put_differences(&w, mesh->u, cut->vertex_count);
-    put_differences(&w, mesh->v, cut->vertex_count);
-    put_differences(&w, mesh->h, cut->vertex_count);
-    put_triangles(&w, cut, index);
+    put_number(&w, count, 4);
+    put_differences(&w, mesh->u, count);
+    put_differences(&w, mesh->v, count);
+    put_differences(&w, mesh->h, count);
+    put_triangles(&w, mesh, index);
     put_sides(&w, mesh, index);
-    if (cut->vertex_count > 0) code = put_normals(&w, t, mesh, &globe, error);
+    code = put_normals(&w, t, mesh, &globe, error);
     if (plan_of(t)->has_sea) put_water(&w, t, place);
     if (code == SQLITE_OK) code = put_metadata(&w, t, place, mesh, error);
     globe_free(&globe);

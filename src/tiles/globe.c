@@ -15,7 +15,7 @@
  *
  * Normals are the terrain's, from the full-resolution samples (store_normals), turned from east, north, up to
  * geocentric; between samples, where a side cuts a triangle, they are the mean of the four around by nearness. What
- * neighbours share depends on the place alone.
+ * neighbours share depends on the place alone. Specks have the ellipsoid's.
  */
 #include "quantized_mesh.h"
 
@@ -48,7 +48,7 @@ static void place_all(const tile_mesh *mesh, tile_globe *globe) {
     const double e2 = F * (2 - F);
     kept_angle lons[KEPT_ANGLES], lats[KEPT_ANGLES];
     for (int i = 0; i < KEPT_ANGLES; i++) lons[i] = lats[i] = (kept_angle){.cosine = 1};
-    for (size_t i = 0; i < mesh->cut.vertex_count; i++) {
+    for (size_t i = 0; i < mesh_vertices(mesh); i++) {
         const double *p = mesh->lonlath + 3 * i;
         const kept_angle *lon = find_angle(lons, mesh->u[i], p[0] < 180 ? p[0] : p[0] - 360),
                          *lat = find_angle(lats, mesh->v[i], p[1]);
@@ -68,8 +68,7 @@ static void find_sphere(const double *xyz, size_t count, tile_globe *globe) {
             if (x < low[k]) low[k] = x;
             if (x > high[k]) high[k] = x;
         }
-    /* Of a tile that is empty a point of the equator: nobody looks there for anything. */
-    for (int k = 0; k < 3; k++) globe->centre[k] = count > 0 ? (low[k] + high[k]) / 2 : k == 0 ? A : 0;
+    for (int k = 0; k < 3; k++) globe->centre[k] = (low[k] + high[k]) / 2;
     for (size_t i = 0; i < count; i++) {
         const double *p = xyz + 3 * i;
         const double from[3] = {p[0] - globe->centre[0], p[1] - globe->centre[1], p[2] - globe->centre[2]};
@@ -82,7 +81,7 @@ static void find_sphere(const double *xyz, size_t count, tile_globe *globe) {
 static void find_horizon(const double *xyz, size_t count, tile_globe *globe) {
     double direction[3] = {globe->centre[0] / A, globe->centre[1] / A, globe->centre[2] / B}, most = 0;
     const double length = sqrt(dot(direction, direction));
-    bool exists = length > 0 && count > 0;
+    bool exists = length > 0;
     for (int k = 0; k < 3; k++) direction[k] = exists ? direction[k] / length : k == 0;
     for (size_t i = 0; i < count && exists; i++) {
         const double p[3] = {xyz[3 * i] / A, xyz[3 * i + 1] / A, xyz[3 * i + 2] / B};
@@ -99,9 +98,9 @@ static void find_horizon(const double *xyz, size_t count, tile_globe *globe) {
 }
 
 int globe_make(const tile_mesh *mesh, tile_globe *globe) {
-    const size_t count = mesh->cut.vertex_count;
-    *globe = (tile_globe){.xyz = sqlite3_malloc64((3 * count + 1) * sizeof *globe->xyz),
-                          .angles = sqlite3_malloc64((count + 1) * sizeof *globe->angles)};
+    const size_t count = mesh_vertices(mesh);
+    *globe = (tile_globe){.xyz = sqlite3_malloc64(3 * count * sizeof *globe->xyz),
+                          .angles = sqlite3_malloc64(count * sizeof *globe->angles)};
     if (!globe->xyz || !globe->angles) return SQLITE_NOMEM;
     place_all(mesh, globe);
     find_sphere(globe->xyz, count, globe);
@@ -180,6 +179,11 @@ int globe_normals(tiles *t, const tile_mesh *mesh, const tile_globe *globe, uint
         for (int k = 0; k < all[i].count; k++, next += 3)
             for (int c = 0; c < 3; c++) enu[c] += (double)all[i].weight[k] * (double)next[c];
         turn(&globe->angles[i], enu, n);
+        pack(n, packed + 2 * i);
+    }
+    for (size_t i = count; i < mesh_vertices(mesh) && code == SQLITE_OK; i++) {
+        double n[3];
+        turn(&globe->angles[i], (const double[3]){0, 0, 1}, n);
         pack(n, packed + 2 * i);
     }
     sqlite3_free(normals);

@@ -6,7 +6,7 @@
  * are quartered, and a tile that is left is asked by a query that stops at the first block with a triangle. So it
  * takes as many queries as there are tiles near the outlines of voids.
  *
- * The two tiles of level 0 are always there, without a triangle where they have no terrain: Cesium begins with
+ * The two tiles of level 0 are always there, with specks alone where they have no terrain: Cesium begins with
  * both, and draws nothing below one that it does not get. Cesium also wants to be told which tiles there are by
  * tiles that have the metadata extension, and reads none of them unless layer.json has "metadataAvailability": that
  * after so many levels a tile tells of those below it. Here that is one more than there are, so that it is the

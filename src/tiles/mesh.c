@@ -121,6 +121,14 @@ static uint16_t quantise(double at, double from, double to, double low, double h
     return (uint16_t)(n < 1 ? 1 : n > TILE_UNITS - 1 ? TILE_UNITS - 1 : n);
 }
 
+/* What a client reads of a vertex. */
+static void decode_vertex(const tile_plan *plan, const tile_place *place, tile_mesh *mesh, size_t i) {
+    double *out = mesh->lonlath + 3 * i;
+    out[0] = place->west + place->side * mesh->u[i] / TILE_UNITS;
+    out[1] = place->south + place->side * mesh->v[i] / TILE_UNITS;
+    out[2] = plan->lowest + mesh->h[i] * plan->step;
+}
+
 static void note_move(double *most, double by) {
     if (fabs(by) > *most) *most = fabs(by);
 }
@@ -131,7 +139,6 @@ static int place_vertex(const tiles *t, const tile_place *place, tile_mesh *mesh
     const rqt_unit *unit = &t->terrain->unit;
     const rqt_cut_vertex *v = &mesh->cut.vertices[i];
     const tile_turn *turn = turn_of(place, v->col);
-    double *out = mesh->lonlath + 3 * i;
     double height = ((double)unit->z0 + v->q / (double)unit->d) * rqt_unit_factor(unit) + unit->offset;
     if (plan->geoid) {
         const double there[3] = {at->x0 + v->col * at->dx, at->y0 + v->row * at->dy, height};
@@ -143,14 +150,12 @@ static int place_vertex(const tiles *t, const tile_place *place, tile_mesh *mesh
     mesh->v[i] = quantise(v->row, turn->south, turn->north, turn->cut[3], turn->cut[2]);
     const double n = rint((height - plan->lowest) / plan->step);
     mesh->h[i] = (uint16_t)(n < 0 ? 0 : n > TILE_UNITS ? TILE_UNITS : n);
-    out[0] = place->west + place->side * mesh->u[i] / TILE_UNITS;
-    out[1] = place->south + place->side * mesh->v[i] / TILE_UNITS;
-    out[2] = plan->lowest + mesh->h[i] * plan->step;
+    decode_vertex(plan, place, mesh, i);
     note_move(&mesh->move[0],
               (v->col - (turn->west + (turn->east - turn->west) * mesh->u[i] / TILE_UNITS)) * at->dx);
     note_move(&mesh->move[1],
               (v->row - (turn->south + (turn->north - turn->south) * mesh->v[i] / TILE_UNITS)) * at->dy);
-    note_move(&mesh->move[2], height - out[2]);
+    note_move(&mesh->move[2], height - mesh->lonlath[3 * i + 2]);
     return SQLITE_OK;
 }
 
@@ -216,17 +221,19 @@ static int cut_patch(tiles *t, const tile_place *place, rqt_patch *patch, tile_m
 int mesh_make(tiles *t, const tile_place *place, tile_mesh *mesh, char **error) {
     rqt_patch patch = {0};
     *mesh = (tile_mesh){0};
-    int code = cut_patch(t, place, &patch, mesh, error);
-    const size_t n = mesh->cut.vertex_count;
+    int code = place->turns > 0 ? cut_patch(t, place, &patch, mesh, error) : SQLITE_OK;
+    const size_t n = mesh->cut.vertex_count, most = n + MOST_SPECKS;
     if (code == SQLITE_OK) {
-        mesh->u = sqlite3_malloc64((3 * n + 1) * sizeof *mesh->u);
-        mesh->lonlath = sqlite3_malloc64((3 * n + 1) * sizeof *mesh->lonlath);
+        mesh->u = sqlite3_malloc64(3 * most * sizeof *mesh->u);
+        mesh->lonlath = sqlite3_malloc64(3 * most * sizeof *mesh->lonlath);
         code = mesh->u && mesh->lonlath ? SQLITE_OK : SQLITE_NOMEM;
     }
     if (code == SQLITE_OK) {
-        mesh->v = mesh->u + n;
-        mesh->h = mesh->v + n;
+        mesh->v = mesh->u + most;
+        mesh->h = mesh->v + most;
         for (size_t i = 0; i < n && code == SQLITE_OK; i++) code = place_vertex(t, place, mesh, i, error);
+        specks_add(mesh);
+        for (size_t i = n; i < mesh_vertices(mesh); i++) decode_vertex(t->plan, place, mesh, i);
     }
     for (int side = 0; side < SIDES && code == SQLITE_OK; side++) code = list_side(mesh, side);
     mesh->move[2] += mesh->merged;

@@ -17,7 +17,7 @@ static int make(tiles *t, int series, int z, int32_t x, int32_t y, tile_bytes *o
     tile_mesh mesh = {0};
     (void)series;
     if (!plan_place(t, z, x, y, &place)) return SQLITE_OK;
-    int code = place.turns > 0 ? mesh_make(t, &place, &mesh, error) : SQLITE_OK;
+    int code = mesh_make(t, &place, &mesh, error);
     if (code == SQLITE_OK && (mesh.cut.triangle_count > 0 || z == 0))
         code = encode_tile(t, &place, &mesh, out, error);
     mesh_free(&mesh);

@@ -4,6 +4,7 @@
  *   plan.c            levels and their tolerances, heights, where tiles lie on the raster
  *   seam.c            terrains that go around the Earth
  *   mesh.c            the terrain's mesh, cut to a tile and quantised; what it is off
+ *   speck.c           what a tile has where it has no terrain
  *   globe.c           places in space: bounding sphere, horizon, normals
  *   water.c           the water mask
  *   encode.c          bytes
@@ -87,6 +88,7 @@ double seam_merge(const tiles *t, rqt_patch *patch);
 
 typedef struct tile_mesh {
     rqt_cut cut;         /* vertices in samples */
+    uint32_t specks;     /* vertices behind those of the cut, each a triangle without area */
     uint16_t *u, *v, *h; /* of each vertex */
     double *lonlath;     /* what a client reads of them: degrees and metres above the ellipsoid */
     uint32_t *edge[4];   /* vertices on the tile's west, south, east, north side, from south or west on */
@@ -96,9 +98,15 @@ typedef struct tile_mesh {
     double error;          /* no sample is further from the mesh in space: metres */
     double vertical_error; /* ... above or below it in longitude, latitude, height, where the outline is not near */
 } tile_mesh;
-/* Without a triangle, when the tile has none. */
+enum { MOST_SPECKS = 16 };
+static inline size_t mesh_vertices(const tile_mesh *mesh) {
+    return mesh->cut.vertex_count + mesh->specks;
+}
+/* Its cut is without a triangle, when the tile has none. */
 int mesh_make(tiles *t, const tile_place *place, tile_mesh *mesh, char **error);
 void mesh_free(tile_mesh *mesh);
+/* Where the tile has no terrain; u, v, h have room for MOST_SPECKS more. */
+void specks_add(tile_mesh *mesh);
 
 /* Where a vertex is on the globe: sines and cosines of its longitude and latitude. */
 typedef struct tile_angles {

@@ -52,8 +52,8 @@ export async function askTerrains() {
 }
 
 /** layer.json of a terrain's tiles for globes. */
-export const askLayer = terrain => askJson(`${tilesPath(terrain)}/layer.json`);
-export const tilesPath = terrain => `collections/${encodeURIComponent(terrain)}/tiles/quantized-mesh`;
+export const askLayer = terrain => askJson(`${tilesPath(terrain, 'quantized-mesh')}/layer.json`);
+export const tilesPath = (terrain, kind) => `collections/${encodeURIComponent(terrain)}/tiles/${kind}`;
 
 /**
  * The path of the mesh that a camera needs (camera.js), with the rest of the terrain as coarse as may be, so that one that

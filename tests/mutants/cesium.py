@@ -1,8 +1,8 @@
 """Mutants of the page /cesium and of what Cesium needs of the tiles: see ../mutants.py."""
 
 CESIUM, TILES, SERVE = "web/cesium.test.mjs", "test_tiles.py", "test_serve.py"
-LAYER, ENCODE, KIND, PYRAMID = ("src/tiles/%s.c" % name for name in ("layer", "encode", "quantized_mesh", "pyramid"))
-PAGE, GLOBE, FLIGHT = ("src/web/cesium/%s.js" % name for name in ("main", "globe", "flight"))
+LAYER, ENCODE, KIND, PYRAMID, SPECK, MESH = ("src/tiles/%s.c" % name for name in ("layer", "encode", "quantized_mesh", "pyramid", "speck", "mesh"))
+GLOBE, TILESET = ("src/web/cesium/%s.js" % name for name in ("globe", "tileset"))
 
 MUTANTS = [
     # tiles as Cesium takes them
@@ -12,13 +12,15 @@ MUTANTS = [
     ("cesium: a tile tells of the other half", LAYER, "add_ranges(ranges, count, x << z, ((x + 1) << z) - 1, list);", "add_ranges(ranges, count, 0, (2 << z) - 1, list);", TILES, "each tells of those below it"),
     ("cesium: tiles tell of levels that are not there", PYRAMID, "    tiles_tell(t, p->last);\n", "", TILES, "tell of no others than there are"),
     ("cesium: heights are a step too high", ENCODE, "put_float(w, (float)plan->lowest);", "put_float(w, (float)(plan->lowest + 3));", CESIUM, "africa: sampleTerrainMostDetailed"),
+    # specks
+    ("cesium: no specks", MESH, "        specks_add(mesh);\n", "", CESIUM, "Cesium with its checks"),
+    ("cesium: specks that nobody needs", SPECK, "if (!is_bare(mesh, &s)) continue;", "", TILES, "a speck where, and only where"),
+    ("cesium: triangles near a sixteenth are in it", SPECK, "if (inner >= 0 ? side >= 0 : side <= 0) return false;", "return false;", TILES, "a speck where, and only where"),
+    ("cesium: specks are on the ground of the terrain", SPECK, "count > 0 ? mesh->h[0] : 0", "0", TILES, "at a height that the tile has"),
     # the page
-    ("cesium: it asks a stranger", PAGE, "listTerrains(onGlobe.includes", "fetch('http://127.0.0.2:9/').catch(() => {}); listTerrains(onGlobe.includes", CESIUM, "world: a picture"),
+    ("cesium: 3D Tiles are not drawn", TILESET, "scene.primitives.add(this.tileset);", "", CESIUM, "3D Tiles: they"),
     ("cesium: the sun's tables are asked for", GLOBE, "    Transforms.iau2006XysData = new Iau2006XysData({totalSamples: 0}); // no tables\n", "", CESIUM, "world: a picture"),
-    ("cesium: no light of the normals, no terrain", GLOBE, "globe.material = paint(heights, spacingOf(heights));", "globe.show = false;", CESIUM, "world: a picture"),
-    ("cesium: it stays", FLIGHT, "this.at = (this.at + seconds / ROUND) % 1;", "", CESIUM, "it flies"),
-    ("cesium: contours are forgotten", "src/web/cesium/state.js", "contours: given.has('contours'),", "contours: false,", CESIUM, "keys and the address"),
-    ("cesium: no sentence", PAGE, "return excuse(problem.message);", "return undefined;", CESIUM, "where there is nothing to see"),
+    ("cesium: no light of the normals, no terrain", GLOBE, "this.globe.material = paint(this.heights, this.spacing);", "this.globe.show = false;", CESIUM, "world: a picture"),
     ("cesium: without npm nothing is said", "src/web/cesium/bundle.sh", 'cp "$here/../without.js" "$out/$script.js"', ': >"$out/$script.js"', CESIUM, "without npm"),
     # files, gzipped once
     ("cesium: what is gzipped is gzipped", "src/serve/negotiate.c", "if (a->coding == CODING_GZIP && a->is_gzipped) return;", "", SERVE, "is gzipped already: gzip is"),

@@ -16,8 +16,9 @@ import {Service, sql} from './serve.mjs';
 
 const {default: decode} = requirePackage('@here/quantized-mesh-decoder');
 const RQT = process.env.RQT || join(BUILD, 'rqt');
-const PLACES = 400; // in each terrain, a few of which are too near to its rim or to voids
-const WINDOWS = 8, WINDOW = 100; // in which they are; samples a side
+const PLACES = 160; // in each terrain, a few of which are too near to its rim or to voids
+const WINDOWS = 4, WINDOW = 100; // in which they are; samples a side
+const UNSEEN = {width: 64, height: 64}; // where pictures do not matter
 const data = name => join(ROOT, 'tests', 'data', name);
 
 /** x0, y0: the first sample; step in degrees. */
@@ -72,7 +73,7 @@ const sentence = view => view.page.evaluate(() => document.querySelector('#excus
 async function shareOfTerrain(view) {
     const show = is => view.page.evaluate(async shown => {
         const {globe} = window.rqtCesium;
-        globe.globe.show = shown;
+        globe.surface.isShown = shown;
         for (let i = 0; i < 3; i++) {
             globe.scene.requestRender();
             await new Promise(resolve => requestAnimationFrame(resolve));
@@ -157,7 +158,7 @@ async function judge(terrain, z, places, heights, read, mayMiss = false) {
 
 for (const [name, terrain] of Object.entries(TERRAINS))
     test(`${name}: sampleTerrainMostDetailed and sampleTerrain of every level are within what the tiles state`, keepingShots(`cesium-${name}`, () => views, async () => {
-        const view = await open(`?terrain=${name}`), {errors} = await state(view), finest = errors.length - 1;
+        const view = await open(`?terrain=${name}`, UNSEEN), {errors} = await state(view), finest = errors.length - 1;
         // Where all around are heights too: the outlines of voids move as vertices do.
         const all = placesOf(terrain, finest), around = terrain.step;
         const grid = await heightsAt(name, all.flatMap(([x, y]) => [-1, 0, 1].flatMap(i => [-1, 0, 1].map(j => [x + i * around, y + j * around]))));
@@ -167,7 +168,7 @@ for (const [name, terrain] of Object.entries(TERRAINS))
             places.push(place);
             heights.push(grid[9 * i + 4]);
         });
-        assert.ok(places.length >= 300, `${places.length} places`);
+        assert.ok(places.length >= 110, `${places.length} places`);
         const sample = level => view.page.evaluate(([p, z]) => window.rqtCesium.sample(p, z ?? undefined), [places, level]);
         const {worst} = await judge(name, finest, places, heights, await sample(null));
         assert.ok(worst > 0.01, `heights are rounded: ${worst}`);
@@ -181,6 +182,92 @@ for (const [name, terrain] of Object.entries(TERRAINS))
         assert.deepEqual(view.problems, []);
         await view.close();
     }));
+
+// ------------------------------------------------------------------------------------------------- Cesium with its checks
+
+test('Cesium with its checks for developers cuts tiles that have terrain in part, or none: the picture is done', keepingShots('cesium-checks', () => views, async () => {
+    const workers = ['createVerticesFromQuantizedTerrainMesh', 'upsampleQuantizedTerrainMesh', 'incrementallyBuildTerrainPicker', 'transferTypedArrayTest'];
+    const out = join(home, 'checks'), packages = join(ROOT, 'build', 'cesium-packages');
+    execFileSync(join(ROOT, 'src', 'web', 'cesium', 'bundle.sh'), ['--with-checks', out, packages, ...workers], {stdio: 'pipe'});
+    assert.match(readFileSync(join(out, 'upsampleQuantizedTerrainMesh.js'), 'utf8'), /Rectangle width must be between 0 and 2 \* pi/);
+    const served = new Set([...workers, 'cesium'].map(name => `${name}.js`));
+    const prepare = page => page.route(url => served.has(url.pathname.slice(1)), route => route.fulfill({path: join(out, new URL(route.request().url()).pathname)}));
+    // The northern rim, with voids before it; the tile of level 0 to the west has nothing.
+    const view = await open('?terrain=pyrenees', {width: 160, height: 120, prepare});
+    await settled(view);
+    const {levels} = await state(view);
+    assert.ok(levels.finest > 8, JSON.stringify(levels));
+    assert.deepEqual(view.problems, []);
+    await view.close();
+}));
+
+// ------------------------------------------------------------------------------------------------------------ 3D Tiles
+
+/** What a subtree tells of its tiles: Map of level/x/y to {error, region}. */
+async function readSubtree(terrain, level, x, y) {
+    const answer = await fetch(`${service.url}collections/${terrain}/tiles/3d-tiles/subtrees/${level}/${x}/${y}.subtree`);
+    const bytes = Buffer.from(await answer.arrayBuffer()), length = Number(bytes.readBigUInt64LE(8));
+    const json = JSON.parse(bytes.toString('utf8', 24, 24 + length)), data = bytes.subarray(24 + length), told = new Map();
+    const view = i => json.bufferViews[i].byteOffset, {error, region} = json.propertyTables[0].properties, {constant, bitstream} = json.tileAvailability;
+    let place = 0, row = 0;
+    for (let depth = 0; depth < 4; depth++)
+        for (let morton = 0; morton < 4 ** depth; morton++, place++) {
+            if (!(constant ?? data[view(bitstream) + (place >> 3)] >> place % 8 & 1)) continue;
+            let i = 0, j = 0;
+            for (let bit = 0; bit < depth; bit++) {
+                i |= (morton >> 2 * bit & 1) << bit;
+                j |= (morton >> (2 * bit + 1) & 1) << bit;
+            }
+            const from = view(region.values) + 48 * row;
+            told.set([level + depth, (x << depth) + i, (y << depth) + j].join('/'),
+                {error: data.readDoubleLE(view(error.values) + 8 * row), region: [0, 1, 2, 3, 4, 5].map(k => data.readDoubleLE(from + 8 * k))});
+            row++;
+        }
+    return told;
+}
+
+test('3D Tiles: they are drawn, with the errors and regions of their subtrees, and heights within what is stated', keepingShots('cesium-3d-tiles', () => views, async () => {
+    const view = await open('?terrain=pyrenees&tiles=3d-tiles', SMALL);
+    await settled(view);
+    await view.page.evaluate(() => { document.querySelector('#tools').hidden = true; });
+    await view.shot('cesium-3d-tiles');
+    const {tiles, levels, errors} = await state(view);
+    assert.equal(tiles, '3d-tiles');
+    assert.equal(await view.page.inputValue('#tiles'), '3d-tiles');
+    assert.ok(levels.finest > 2 && levels.finest < errors.length, JSON.stringify(levels));
+    assert.match(await view.page.textContent('#promise'), /^Levels? \d+( to \d+)?: proved to be off by no more than [\d.\u202f]+\u00a0k?m/);
+    assert.ok(await shareOfTerrain(view) > 0.25);
+    // What Cesium has of its tiles, down to those that it has looked at.
+    const seen = await view.page.evaluate(() => {
+        const found = [], walk = tile => {
+            const {implicitCoordinates: at, boundingVolume: {rectangle: r, minimumHeight, maximumHeight}} = tile;
+            if (at && !tile.implicitTileset) found.push([[at.level, at.x, at.y], tile.geometricError, [r.west, r.south, r.east, r.north, minimumHeight, maximumHeight]]);
+            tile.children.forEach(walk);
+        };
+        walk(window.rqtCesium.globe.surface.tileset.root);
+        return found;
+    });
+    const subtrees = new Map();
+    assert.ok(seen.length > 50, `${seen.length} tiles`);
+    for (const [[level, x, y], error, region] of seen) {
+        const up = level % 4, root = [level - up, x >> up, y >> up], key = root.join('/');
+        if (!subtrees.has(key)) subtrees.set(key, await readSubtree('pyrenees', ...root));
+        assert.deepEqual({error, region}, subtrees.get(key).get([level, x, y].join('/')), `${level}/${x}/${y}`);
+        assert.ok(error <= errors[level] * (1 + 1e-11), `${level}/${x}/${y}: ${error} of ${errors[level]}`);
+    }
+    // From above, of the finest tiles. What is seen comes out of depths that a graphics card rounds.
+    const {x0, y0, step} = TERRAINS.pyrenees, all = Array.from({length: 70}, () => [x0 + step * (520.5 + dice.below(100)), y0 - step * (1200.5 + dice.below(100))]);
+    const known = await heightsAt('pyrenees', all), places = all.filter((_, i) => known[i] !== null), heights = known.filter(z => z !== null);
+    assert.ok(places.length >= 50, `${places.length} places`);
+    const read = await view.page.evaluate(p => window.rqtCesium.sampleTileset(p), places);
+    const off = read.map((z, i) => z === null ? Infinity : Math.abs(z - heights[i]));
+    console.log(`3D Tiles: ${places.length} places, off by ${Math.max(...off)} m at most, ${errors.at(-1)} m stated`);
+    assert.ok(Math.max(...off) <= errors.at(-1) + 0.05, `${Math.max(...off)} m at ${places[off.indexOf(Math.max(...off))]}`);
+    const strange = view.asked.filter(({pathname}) => !/^\/(cesium|collections|[\w-]+\.(js|css))/.test(pathname));
+    assert.deepEqual(strange.map(({href}) => href).filter(href => !/^(blob|data):/.test(href)), []);
+    assert.deepEqual(view.problems, []);
+    await view.close();
+}));
 
 // ---------------------------------------------------------------------------------------------------------------- page
 

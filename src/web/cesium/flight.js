@@ -17,7 +17,7 @@ function gridOf([west, south, east, north]) {
 export class Flight {
     /** Round the highest of the places that are looked at: as many as a few tiles show. */
     static async round(globe, bbox, heights) {
-        const places = gridOf(bbox), level = Math.max(0, globe.levels.finest - 3);
+        const places = gridOf(bbox), level = Math.max(0, globe.sampled.finest - 3);
         const found = await globe.sample(places, level);
         let top = -1;
         found.forEach((height, i) => { if (height !== null && (top < 0 || height > found[top])) top = i; });

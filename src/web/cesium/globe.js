@@ -1,4 +1,4 @@
-// globe.js - Cesium's scene with a terrain of ours on its globe, and nothing from anywhere else.
+// globe.js - Cesium's scene with a terrain of ours, as quantized-mesh on its globe or as 3D Tiles, and nothing from anywhere else.
 //
 // Cesium comes as its engine alone (Scene and Globe, not its widgets), so that the page is a fourth of what it could be.
 // Nothing is fetched but the terrain's tiles: the sky is computed, there is no imagery, and the sun's place, for which
@@ -11,8 +11,10 @@ import {
 } from '@cesium/engine';
 import {LAND, SEA, colourAt} from '../ramps.js';
 import {askLayer, tilesPath} from '../service.js';
+import {TilesetSurface} from './tileset.js';
 
 const LIGHT = [-1, 1, 1.1]; // where it comes from: east, north, up
+const SHADING = [0.85, 0.28]; // of the light, and without it
 const PIXELS = 2; // that a tile may be off
 const SHADES = 1024; // of the ramp of heights
 const SEA_BED = 400; // metres below the ellipsoid, or the terrain: where the globe is that has no terrain
@@ -69,21 +71,66 @@ function levelsOf({geometricErrors: errors, eps, maxzoom: finest}) {
     return {errors, finest};
 }
 
+/** Terrain as quantized-mesh, on Cesium's globe. tileset.js has the same doors. */
+class GlobeSurface {
+    constructor(provider, levels, {heights, spacing}) {
+        Object.assign(this, {provider, levels, heights, spacing});
+    }
+
+    addTo(scene, complain) {
+        this.globe = scene.globe;
+        this.scene = scene;
+        scene.terrainProvider = this.provider;
+        this.globe.material = paint(this.heights, this.spacing);
+        this.provider.errorEvent.addEventListener(({message}) => complain(message));
+    }
+
+    set isShown(is) {
+        this.globe.show = is;
+    }
+
+    set contours(are) {
+        this.globe.material.uniforms.contours = are ? 1 : 0;
+    }
+
+    /** Cesium has no public door to this: its inspector goes by the same. */
+    set wires(are) {
+        this.globe._surface.tileProvider._debug.wireframe = are;
+    }
+
+    get shown() {
+        return this.globe._surface._tilesToRender.map(({level}) => Math.min(level, this.levels.finest));
+    }
+
+    get isLoaded() {
+        return this.globe.tilesLoaded;
+    }
+
+    pick(at) {
+        const ray = this.scene.camera.getPickRay(at);
+        return ray && this.globe.pick(ray, this.scene);
+    }
+}
+
 export class TerrainGlobe {
     /**
      * @param stage {canvas, credits, lightbox}: elements
      * @param terrain {id, bbox, terrain: {min_z, max_z}} as the service tells
+     * @param kind of tiles: "quantized-mesh", "3d-tiles"
      */
-    static async create(stage, terrain) {
+    static async create(stage, terrain, kind) {
         settle();
+        const {min_z, max_z} = terrain.terrain, heights = [min_z ?? 0, Math.max(max_z ?? 0, (min_z ?? 0) + 1)];
+        const style = {heights, spacing: spacingOf(heights), ramp: ramp(heights), light: SHADING, pixels: PIXELS};
         const levels = levelsOf(await askLayer(terrain.id));
-        const provider = await CesiumTerrainProvider.fromUrl(tilesPath(terrain.id), {requestVertexNormals: true});
-        return new TerrainGlobe(stage, terrain, provider, levels);
+        const provider = await CesiumTerrainProvider.fromUrl(tilesPath(terrain.id, 'quantized-mesh'), {requestVertexNormals: true});
+        const surface = kind === '3d-tiles' ? await TilesetSurface.create(terrain, style) : new GlobeSurface(provider, levels, style);
+        return new TerrainGlobe(stage, terrain, surface, {provider, finest: levels.finest}, heights);
     }
 
-    constructor({canvas, credits, lightbox}, {bbox: [west, south, east, north], terrain: {min_z, max_z}}, provider, levels) {
-        const heights = [min_z ?? 0, Math.max(max_z ?? 0, (min_z ?? 0) + 1)];
-        Object.assign(this, {canvas, provider, levels, heights, centre: [(west + east) / 2, (south + north) / 2]});
+    /** sampled: quantized-mesh, whichever kind is shown: heights are read from it. */
+    constructor({canvas, credits, lightbox}, {bbox: [west, south, east, north]}, surface, sampled, heights) {
+        Object.assign(this, {canvas, surface, sampled, levels: surface.levels, heights, centre: [(west + east) / 2, (south + north) / 2]});
         const scene = new Scene({
             canvas, creditContainer: credits, creditViewport: lightbox, scene3DOnly: true, requestRenderMode: true, maximumRenderTimeChange: Infinity,
             orderIndependentTranslucency: false, msaaSamples: 4,
@@ -91,17 +138,15 @@ export class TerrainGlobe {
         const globe = new Globe();
         scene.globe = globe;
         scene.camera.constrainedAxis = Cartesian3.UNIT_Z;
-        scene.terrainProvider = provider;
         scene.skyAtmosphere = new SkyAtmosphere();
         scene.backgroundColor = Color.fromCssColorString('#0b1016');
         const frame = Transforms.eastNorthUpToFixedFrame(Cartesian3.fromDegrees(...this.centre));
         const from = Matrix4.multiplyByPointAsVector(frame, new Cartesian3(...LIGHT), new Cartesian3());
         scene.light = new DirectionalLight({direction: Cartesian3.negate(Cartesian3.normalize(from, from), from), intensity: 1.6});
         Object.assign(globe, {
-            enableLighting: true, dynamicAtmosphereLighting: false, lambertDiffuseMultiplier: 0.85, vertexShadowDarkness: 0.28, showWaterEffect: false,
+            enableLighting: true, dynamicAtmosphereLighting: false, lambertDiffuseMultiplier: SHADING[0], vertexShadowDarkness: SHADING[1], showWaterEffect: false,
             depthTestAgainstTerrain: true, tileCacheSize: 400, maximumScreenSpaceError: PIXELS, baseColor: Color.WHITE, backFaceCulling: false,
         });
-        globe.material = paint(heights, spacingOf(heights));
         // Where there is no terrain, a globe nonetheless.
         const below = Math.min(0, heights[0]) - SEA_BED, {x, y, z} = globe.ellipsoid.radii;
         scene.primitives.add(new EllipsoidPrimitive({
@@ -109,7 +154,7 @@ export class TerrainGlobe {
             material: Material.fromType('Color', {color: Color.fromCssColorString('#4b5b69')}),
         }));
         Object.assign(this, {scene, globe});
-        provider.errorEvent.addEventListener(({message}) => this.onProblem?.(message));
+        surface.addTo(scene, sentence => this.onProblem?.(sentence));
         scene.renderError.addEventListener((_, error) => this.onProblem?.(String(error)));
         this.resize();
         new ResizeObserver(() => this.resize()).observe(canvas);
@@ -138,19 +183,18 @@ export class TerrainGlobe {
     }
 
     set contours(are) {
-        this.globe.material.uniforms.contours = are ? 1 : 0;
+        this.surface.contours = are;
         this.scene.requestRender();
     }
 
-    /** Cesium has no public door to this: its inspector goes by the same. */
     set wires(are) {
-        this.globe._surface.tileProvider._debug.wireframe = are;
+        this.surface.wires = are;
         this.scene.requestRender();
     }
 
     /** {finest, coarsest}: levels that the tiles in the picture are of, or were cut from; undefined: none yet. */
     shownLevels() {
-        const shown = this.globe._surface._tilesToRender.map(({level}) => Math.min(level, this.levels.finest));
+        const {shown} = this.surface;
         return shown.length ? {finest: Math.max(...shown), coarsest: Math.min(...shown)} : undefined;
     }
 
@@ -169,18 +213,18 @@ export class TerrainGlobe {
     }
 
     /**
-     * Metres above the ellipsoid at places [longitude, latitude] in degrees, as Cesium reads them from tiles of a level, or from
+     * Metres above the ellipsoid at places [longitude, latitude] in degrees, as Cesium reads them from quantized-mesh of a level, or from
      * the finest ones that there are (level undefined); null where the tiles have no terrain.
      */
     async sample(places, level) {
         const at = places.map(([longitude, latitude]) => Cartographic.fromDegrees(longitude, latitude, NaN));
-        await (level === undefined ? sampleTerrainMostDetailed(this.provider, at) : sampleTerrain(this.provider, level, at));
+        await (level === undefined ? sampleTerrainMostDetailed(this.sampled.provider, at) : sampleTerrain(this.sampled.provider, level, at));
         return at.map(({height}) => Number.isFinite(height) ? height : null);
     }
 
     /** The place under CSS pixels of the canvas: {longitude, latitude, height}, or null. */
     pick(x, y) {
-        const {scene, globe} = this, ray = scene.camera.getPickRay({x, y}), point = ray && globe.pick(ray, scene);
+        const point = this.surface.pick({x, y});
         if (!point) return null;
         const {longitude, latitude, height} = Cartographic.fromCartesian(point);
         return {longitude: longitude * 180 / Math.PI, latitude: latitude * 180 / Math.PI, height};
@@ -189,7 +233,7 @@ export class TerrainGlobe {
     /** When every tile that the picture needs is in it. */
     async settled() {
         const frame = () => new Promise(resolve => requestAnimationFrame(resolve));
-        for (let quiet = 0; quiet < 5; quiet = this.globe.tilesLoaded && this.shownLevels() ? quiet + 1 : 0) {
+        for (let quiet = 0; quiet < 5; quiet = this.surface.isLoaded && this.shownLevels() ? quiet + 1 : 0) {
             this.scene.requestRender();
             await frame();
         }

@@ -2,12 +2,13 @@
 //
 // For tests there is window.rqtCesium:
 //   ready              Promise, kept when the globe stands: of true, or of false where the page says why not
-//   state()            {terrain, camera, exaggeration, contours, wires, fly, levels, errors}
+//   state()            {terrain, tiles, camera, exaggeration, contours, wires, fly, levels, errors}
 //   set(settings)      {exaggeration, contours, wires, fly}
 //   setCamera(camera)  {longitude, latitude, height, heading, pitch}: degrees, metres above the ellipsoid
 //   seek(share)        puts the flight at a share of its round
 //   settled()          Promise, kept when every tile that the picture needs is in it
 //   sample(places, z)  Promise of heights above the ellipsoid, of level z or of the finest that there is (Cesium's sampleTerrain)
+//   sampleTileset(p)   the same, as 3D Tiles are seen from above (Cesium's sampleHeightMostDetailed)
 //   pick(x, y)         {longitude, latitude, height} under CSS pixels, or null
 //   globe              the TerrainGlobe (globe.js)
 
@@ -15,7 +16,7 @@ import {metres} from '../format.js';
 import {askTerrains} from '../service.js';
 import {Flight} from './flight.js';
 import {TerrainGlobe} from './globe.js';
-import {readAddress, writeFragment} from './state.js';
+import {addressOf, readAddress, writeFragment} from './state.js';
 
 const element = id => document.getElementById(id);
 const WGS84 = {semi_major: 6378137, inverse_flattening: 298.257223563};
@@ -31,16 +32,19 @@ function excuse(sentence) {
 /** Terrains that may have tiles: the service knows for certain. */
 const isOnGlobe = ({terrain}) => terrain.lonlat && terrain.semi_major === WGS84.semi_major && Math.abs(terrain.inverse_flattening - WGS84.inverse_flattening) < 1e-6;
 
-function listTerrains(terrains, chosen) {
+function listTerrains(terrains, chosen, tiles) {
     element('terrain').replaceChildren(...terrains.map(({id}) => new Option(id, id, id === chosen, id === chosen)));
-    element('terrain').onchange = event => { location.href = `cesium?terrain=${encodeURIComponent(event.target.value)}`; };
+    element('terrain').onchange = event => { location.href = addressOf(event.target.value, tiles); };
+    // The same view, of the other kind.
+    element('tiles').value = tiles;
+    element('tiles').onchange = event => { location.href = addressOf(chosen, event.target.value) + location.hash; };
     element('viewer').href = `./#terrain=${encodeURIComponent(chosen)}`;
     document.title = `${chosen} \u2013 rqt, Cesium`;
 }
 
 class Page {
     constructor(terrain, globe, flight, given) {
-        Object.assign(this, {terrain, globe, flight, settings: {exaggeration: 1, contours: false, wires: false, fly: false}});
+        Object.assign(this, {terrain, tiles: given.tiles, globe, flight, settings: {exaggeration: 1, contours: false, wires: false, fly: false}});
         globe.onProblem = sentence => this.complain(sentence);
         globe.onFrame = now => flight.step(now, this.settings.exaggeration);
         globe.scene.postRender.addEventListener(() => this.tell());
@@ -140,12 +144,13 @@ class Page {
     hook() {
         const {globe, flight, settings} = this;
         return {
-            state: () => ({terrain: this.terrain.id, camera: globe.camera, ...settings, levels: globe.shownLevels(), errors: globe.levels.errors}),
+            state: () => ({terrain: this.terrain.id, tiles: this.tiles, camera: globe.camera, ...settings, levels: globe.shownLevels(), errors: globe.levels.errors}),
             set: changes => this.set(changes),
             setCamera: camera => { globe.camera = camera; },
             seek: share => { flight.at = share; flight.show(settings.exaggeration); },
             settled: () => globe.settled(),
             sample: (places, level) => globe.sample(places, level),
+            sampleTileset: places => globe.surface.sample(places),
             pick: (x, y) => globe.pick(x, y),
             globe,
         };
@@ -159,10 +164,10 @@ async function begin() {
         const terrain = given.terrain === undefined ? onGlobe[0] : terrains.find(({id}) => id === given.terrain);
         if (given.terrain !== undefined && !terrain) return excuse(`There is no terrain ${given.terrain}.`);
         if (!terrain) return excuse('There is no terrain in longitude and latitude on WGS 84 in the databases that are served: others have no tiles for globes.');
-        listTerrains(onGlobe.includes(terrain) ? onGlobe : [terrain, ...onGlobe], terrain.id);
+        listTerrains(onGlobe.includes(terrain) ? onGlobe : [terrain, ...onGlobe], terrain.id, given.tiles);
         if (!document.createElement('canvas').getContext('webgl2')) return excuse('This browser shows no WebGL 2, which Cesium draws with.');
         const stage = {canvas: element('picture'), credits: element('credits'), lightbox: element('stage')};
-        const globe = await TerrainGlobe.create(stage, terrain);
+        const globe = await TerrainGlobe.create(stage, terrain, given.tiles);
         const page = new Page(terrain, globe, await Flight.round(globe, terrain.bbox, globe.heights), given);
         return page.hook();
     } catch (problem) {
