@@ -39,7 +39,7 @@ strip() {
     find "$2/Source" -name '*.js' -exec sed -i '/^ *\/\/>>includeStart(.debug/,/^ *\/\/>>includeEnd(.debug/d' {} +
 }
 command -v node >/dev/null 2>&1 && command -v npm >/dev/null 2>&1 || without "node or npm is missing (Debian: nodejs, npm)"
-if ! cmp -s "$here/package-lock.json" "$packages/installed.json"; then
+if ! cmp -s "$here/package-lock.json" "$packages/installed.json" || [ ! -d "$packages/node_modules/@cesium/released" ]; then
     cp "$here/package.json" "$here/package-lock.json" "$here/.npmrc" "$packages/"
     (cd "$packages" && npm ci --ignore-scripts --no-audit --no-fund >npm.log 2>&1) ||
         without "npm cannot install @cesium/engine and esbuild ($packages/npm.log)"
