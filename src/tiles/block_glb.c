@@ -7,7 +7,7 @@
  * (X, Z, -Y) here.
  *
  * Where it is. The node's translation has the origin, whole metres and steps, which is a double there whatever it
- * is printed with: clients of 3D Tiles add it to their matrices in double (CesiumJS, three's 3DTilesRendererJS),
+ * is printed with: clients of 3D Tiles add it to their matrices in double (CesiumJS does),
  * unlike viewers of models (format/glb.c). Positions are whole steps from it, as floats exactly. What two tiles
  * share is decoded to the same doubles in both: translation + position is exact.
  *

@@ -156,7 +156,8 @@ static int write_tile(pyramid *p, tiles *t, const piece *row, int32_t x, char **
     const tile_series *series = &p->job->kind->series[row->series];
     const int folder = snprintf(path, sizeof path, "%s/%s%d/%d", p->job->folder, series->folder, row->z, (int)x);
     snprintf(path + folder, sizeof path - (size_t)folder, "/%d%s", (int)row->y, series->suffix);
-    if (lstat(path, &there) == 0 && S_ISREG(there.st_mode)) return SQLITE_OK;
+    /* An empty one is what a cut of power may leave of a file that has its name already. */
+    if (lstat(path, &there) == 0 && S_ISREG(there.st_mode) && there.st_size > 0) return SQLITE_OK;
     int code = tiles_make(t, row->series, row->z, x, row->y, &tile, error);
     if (code == SQLITE_OK && tile.size > 0) {
         if (p->job->gzip && !series->is_packed) code = pack(&tile);

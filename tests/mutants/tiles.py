@@ -55,7 +55,7 @@ MUTANTS = [
     ("tiles: a tile that touches the raster is listed", PLAN, "return (from > 0 ? from : 0) < (to < last ? to : last);", "return (from > 0 ? from : 0) <= (to < last ? to : last) + (1 << UNIT_BITS);", TILES,
      "the same tiles"),
     # to disk
-    ("tiles: all is made again", PYRAMID, "if (lstat(path, &there) == 0 && S_ISREG(there.st_mode)) return SQLITE_OK;", "(void)there;", TILES, "without making again"),
+    ("tiles: all is made again", PYRAMID, "if (lstat(path, &there) == 0 && S_ISREG(there.st_mode) && there.st_size > 0) return SQLITE_OK;", "(void)there;", TILES, "without making again"),
     ("tiles: anybody's folder will do", PYRAMID, "if ((size_t)n == size && memcmp(there, description, size) == 0) return SQLITE_OK;", "return SQLITE_OK;", TILES, "are not mixed in"),
     ("tiles: what nobody says anything of is ours", PYRAMID, "if (n == 0) code = check_empty(job->folder, error);", "if (n < 0) code = check_empty(job->folder, error);", TILES, "says nothing of its files"),
     ("tiles: two commands write into one folder", PYRAMID, "if (flock(*file, LOCK_EX | LOCK_NB))", "if (flock(*file, LOCK_UN))", TILES, "by one command at a time"),
