@@ -59,12 +59,23 @@ static bool is_bare(const tile_mesh *mesh, const square *s) {
     return true;
 }
 
+/* Where a vertex is in a square its triangles meet it: that settles most squares in one pass. */
+static void note_vertices(const tile_mesh *mesh, bool has_vertex[CELLS * CELLS]) {
+    for (size_t i = 0; i < mesh->cut.vertex_count; i++) {
+        const int u = mesh->u[i] % CELL, v = mesh->v[i] % CELL;
+        if (u >= MARGIN && u <= CELL - MARGIN && v >= MARGIN && v <= CELL - MARGIN)
+            has_vertex[mesh->v[i] / CELL * CELLS + mesh->u[i] / CELL] = true;
+    }
+}
+
 void specks_add(tile_mesh *mesh) {
     const size_t count = mesh->cut.vertex_count;
+    bool has_vertex[CELLS * CELLS] = {false};
+    note_vertices(mesh, has_vertex);
     mesh->specks = 0;
     for (int cell = 0; cell < CELLS * CELLS; cell++) {
         const square s = middle_of(cell % CELLS, cell / CELLS);
-        if (!is_bare(mesh, &s)) continue;
+        if (has_vertex[cell] || !is_bare(mesh, &s)) continue;
         const size_t i = count + mesh->specks++;
         mesh->u[i] = (uint16_t)((s.u[0] + s.u[1]) / 2);
         mesh->v[i] = (uint16_t)((s.v[0] + s.v[1]) / 2);

@@ -14,7 +14,7 @@ MUTANTS = [
     ("cesium: heights are a step too high", ENCODE, "put_float(w, (float)plan->lowest);", "put_float(w, (float)(plan->lowest + 3));", CESIUM, "africa: sampleTerrainMostDetailed"),
     # specks
     ("cesium: no specks", MESH, "        specks_add(mesh);\n", "", CESIUM, "Cesium with its checks"),
-    ("cesium: specks that nobody needs", SPECK, "if (!is_bare(mesh, &s)) continue;", "", TILES, "a speck where, and only where"),
+    ("cesium: specks that nobody needs", SPECK, "if (has_vertex[cell] || !is_bare(mesh, &s)) continue;", "if (has_vertex[cell] && !is_bare(mesh, &s) && cell) continue;", TILES, "a speck where, and only where"),
     ("cesium: triangles near a sixteenth are in it", SPECK, "if (inner >= 0 ? side >= 0 : side <= 0) return false;", "return false;", TILES, "a speck where, and only where"),
     ("cesium: specks are on the ground of the terrain", SPECK, "count > 0 ? mesh->h[0] : 0", "0", TILES, "at a height that the tile has"),
     # the page
