@@ -68,10 +68,15 @@ static char *find_root(const request *r) {
                            n > 0 && prefix[0] != '/' ? "/" : "", prefix, r->terrain, r->segments[KIND]);
 }
 
+/* A number of a path, which has few digits (endpoints.c). */
+static int number_of(const char *segment) {
+    return (int)strtol(segment, NULL, 10);
+}
+
 static int make(tiles *t, const request *r, int series, tile_bytes *out, char **error) {
     const char *const *place = r->segments + r->segment_count - 3;
     if (series < 0) return tiles_document(t, r->root, 0, tiles_finest(t), out, error);
-    return tiles_make(t, series, atoi(place[0]), atoi(place[1]), atoi(place[2]), out, error);
+    return tiles_make(t, series, number_of(place[0]), number_of(place[1]), number_of(place[2]), out, error);
 }
 
 /* series < 0: the document. */

@@ -28,15 +28,20 @@ static int read_window(tiles *t, const pixel_grid *g, window *w, char **error) {
                   .width = (int32_t)(east - west) + 1,
                   .height = (int32_t)(south - north) + 1};
     const size_t count = (size_t)w->width * (size_t)w->height;
-    w->q = sqlite3_malloc64(count * (sizeof *w->q + sizeof *w->metres + 1));
-    if (!w->q) return SQLITE_NOMEM;
-    w->metres = (double *)w->q;
-    w->q = (int32_t *)(w->metres + count);
-    w->valid = (uint8_t *)(w->q + count);
+    w->metres = sqlite3_malloc64(count * sizeof *w->metres);
+    w->q = sqlite3_malloc64(count * sizeof *w->q);
+    w->valid = sqlite3_malloc64(count);
+    if (!w->metres || !w->q || !w->valid) return SQLITE_NOMEM;
     const int code = store_window(t->store, t->terrain, w->col, w->row, w->width, w->height, w->q, w->valid, error);
     for (size_t i = 0; i < count && code == SQLITE_OK; i++)
         w->metres[i] = w->valid[i] ? rqt_unit_metres(&t->terrain->unit, w->q[i]) : 0;
     return code;
+}
+
+static void free_window(window *w) {
+    sqlite3_free(w->metres);
+    sqlite3_free(w->q);
+    sqlite3_free(w->valid);
 }
 
 static double to_units(double samples) {
@@ -118,13 +123,12 @@ static int find_cols(const pixel_grid *g, const window *w, int32_t *from, int *i
 }
 
 static int measure(const window *w, pixel_grid *g) {
-    double *u = sqlite3_malloc64((size_t)w->width * (sizeof *u + sizeof(int)));
-    if (!u) return SQLITE_NOMEM;
-    int *i = (int *)(u + w->width);
+    double *u = sqlite3_malloc64((size_t)w->width * sizeof *u);
+    int *i = sqlite3_malloc64((size_t)w->width * sizeof *i);
     int32_t from = 0;
-    const int count = find_cols(g, w, &from, i, u);
+    const int count = u && i ? find_cols(g, w, &from, i, u) : 0;
     double most = g->error;
-    for (int32_t y = 0; y < w->height; y++) {
+    for (int32_t y = 0; y < w->height && count > 0; y++) {
         const size_t first = (size_t)y * (size_t)w->width + (size_t)from;
         int j;
         double v;
@@ -137,8 +141,10 @@ static int measure(const window *w, pixel_grid *g) {
         }
     }
     g->error = most;
+    const bool ok = u && i;
     sqlite3_free(u);
-    return SQLITE_OK;
+    sqlite3_free(i);
+    return ok ? SQLITE_OK : SQLITE_NOMEM;
 }
 
 int samples_draw(tiles *t, pixel_grid *g, char **error) {
@@ -155,7 +161,7 @@ int samples_draw(tiles *t, pixel_grid *g, char **error) {
     pixels_close(g);
     for (int i = 0; i < count; i++) {
         if (code == SQLITE_OK && pixels_turn(g, turns[i])) code = measure(&windows[i], g);
-        sqlite3_free(windows[i].metres);
+        free_window(&windows[i]);
     }
     g->error += t->terrain->quantum_error + ROUNDED;
     return code;

@@ -106,7 +106,7 @@ int tiles_print(cJSON *document, tile_bytes *out) {
     char *text = cJSON_PrintUnformatted(document);
     const size_t size = text ? strlen(text) : 0;
     *out = (tile_bytes){.bytes = text ? sqlite3_malloc64(size + 1) : NULL};
-    if (out->bytes) {
+    if (text && out->bytes) {
         memcpy(out->bytes, text, size);
         out->bytes[size] = '\n';
         out->size = size + 1;
