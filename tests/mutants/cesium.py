@@ -15,7 +15,6 @@ MUTANTS = [
     # specks
     ("cesium: no specks", MESH, "        specks_add(mesh);\n", "", CESIUM, "Cesium with its checks"),
     ("cesium: specks that nobody needs", SPECK, "if (has_vertex[cell] || !is_bare(mesh, &s)) continue;", "if (has_vertex[cell] && !is_bare(mesh, &s) && cell) continue;", TILES, "a speck where, and only where"),
-    ("cesium: triangles near a sixteenth are in it", SPECK, "if (inner >= 0 ? side >= 0 : side <= 0) return false;", "return false;", TILES, "a speck where, and only where"),
     ("cesium: specks are on the ground of the terrain", SPECK, "count > 0 ? mesh->h[0] : 0", "0", TILES, "at a height that the tile has"),
     # the page
     ("cesium: 3D Tiles are not drawn", TILESET, "scene.primitives.add(this.tileset);", "", CESIUM, "3D Tiles: they"),
