@@ -223,6 +223,8 @@ s.check("flat: land at 0 m is a step above 0, void and beyond are 0",
 DEEP = Pictures("deep", make_raster("deep", np.where(x < 100, -40000, 40000), 5, 50, 0.01))
 s.check("deep: what no colour can tell is the nearest one, and the error says so",
         all(t[1] >= 40000 - 32768 for t in DEEP.levels[DEEP.json["maxzoom"]].values() if t[2] < 65536), [t[1] for t in DEEP.levels[5].values()])
+nearest = min(t[1] for t in DEEP.levels[DEEP.json["maxzoom"]].values() if t[2] < 65536)
+s.check("deep: ... but no more than it has to", nearest <= 40000 - 32768 + 1.5, nearest)
 
 # ---------------------------------------------------------------------------------------------------------- the files
 

@@ -19,7 +19,7 @@ MUTANTS = [
     ("terrarium: pixels are at corners", PIXELS, "g->lon[i] = (first_x + i + 0.5) * 360", "g->lon[i] = (first_x + i) * 360", TERRARIUM, "the stated error holds"),
     ("terrarium: the other diagonal", SAMPLES, "if ((x + y) % 2 == 0) {", "if ((x + y) % 2 == 1) {", TERRARIUM, "rqt_height's"),
     ("terrarium: land at 0 m is void", PIXELS, "if (code == NO_HEIGHT) return", "if (code == NO_HEIGHT && metres > 1) return", TERRARIUM, "a step above 0"),
-    ("terrarium: colours wrap", PIXELS, "(n < 0 ? 0 : n > most ? most : n);", "(n < 0 ? n + most : n > most ? n - most : n);", TERRARIUM, "nearest"),
+    ("terrarium: colours wrap", PIXELS, "(n < 0 ? 0 : n > most ? most : n);", "(n < 0 ? n + most : n > most ? n - most : n);", TERRARIUM, "no more than it has to"),
     ("terrarium: pixels on sides are nobody's", "src/tiles/terrarium_leaves.h", "#define SLACK 0x1p-30", "#define SLACK (-0x1p-3)", TERRARIUM, "pixels in the raster"),
     ("terrarium: longitudes count once", PIXELS, "*last = (int)ceil((e.east - g->lon[0]) / 360);", "*last = 0;", TERRARIUM, "turned"),
     # which there are, and bytes

@@ -20,7 +20,7 @@ MUTANTS = [
     ("tiles: sides are rounded as the rest is", MESH, "if (fabs(at - high) < ON_SIDE) return TILE_UNITS;", "", TILES, "shared edges decode to identical"),
     ("tiles: what is near a side is on it", MESH, "n < 1 ? 1 : n > TILE_UNITS - 1 ? TILE_UNITS - 1 : n", "n < 20 ? 0 : n > TILE_UNITS - 20 ? TILE_UNITS : n", TILES, "holes: what is stated is no more than what clients take"),
     ("tiles: v grows south", MESH, "quantise(v->row, turn->south, turn->north, turn->cut[3], turn->cut[2])", "quantise(v->row, turn->north, turn->south, turn->cut[2], turn->cut[3])", TILES,
-     "no sample is further above or below"),
+     "tiles of every level cover the raster"),
     ("tiles: the north side is not listed", MESH, "const uint16_t there = side == WEST || side == SOUTH ? 0 : TILE_UNITS;", "const uint16_t there = side == WEST || side == SOUTH ? 0 : TILE_UNITS - (side == NORTH);",
      TILES, "lists of sides"),
     ("tiles: vertices of a side in one place go by their numbers", MESH, "if (p->place != q->place) return p->place < q->place ? -1 : 1;", "", TILES, "steps: shared edges decode to identical"),
