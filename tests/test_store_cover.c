@@ -2,7 +2,7 @@
  * beside the triangles of the mesh, clipped to the box here. */
 #include "test_store_support.h"
 
-enum { WIDTH = 61, HEIGHT = 47, BOXES = 40, RULES = 2 };
+enum { WIDTH = 61, HEIGHT = 47, BOXES = 40, RULES = 3 };
 
 static uint64_t seed, state;
 static int below(int n) {
@@ -75,7 +75,7 @@ static rqt_rule *make_rule(const store_terrain *t, int kind) {
     rqt_rule *rule = NULL;
     double lowering[RQT_RANKS];
     if (kind == 0) return NULL;
-    for (int rank = 0; rank < RQT_RANKS; rank++) lowering[rank] = rank * rank / 50.0;
+    for (int rank = 0; rank < RQT_RANKS; rank++) lowering[rank] = rank * rank * (kind == 1 ? 0.02 : 3);
     assert_int_equal(rqt_rule_create(&t->lattice, t->quantum_error, store_allocator(), &rule), RQT_OK);
     assert_int_equal(rqt_rule_set_lowering(rule, lowering), RQT_OK);
     return rule;

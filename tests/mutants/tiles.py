@@ -39,7 +39,7 @@ MUTANTS = [
     ("tiles: the water mask begins in the south", WATER, "mask + j * WATER_SIDE", "mask + (WATER_SIDE - 1 - j) * WATER_SIDE", TILES, "the water mask is the sea"),
     ("tiles: water masks are whole", WATER, "== 0 ? 1 :", "== 0 ? WATER_SIDE * WATER_SIDE :", TILES, "one byte of it"),
     # which there are
-    ("tiles: rows are counted from the north", LAYER, 'cJSON_AddNumberToObject(range, "startY", ranges[i].y0);', 'cJSON_AddNumberToObject(range, "startY", (1 << z) - 1 - ranges[i].y0);', TILES, "the same tiles"),
+    ("tiles: rows of layer.json begin one further north", LAYER, 'cJSON_AddNumberToObject(range, "startY", ranges[i].y0);', 'cJSON_AddNumberToObject(range, "startY", ranges[i].y0 + 1);', TILES, "the same tiles"),
     ("tiles: tiles of voids are listed", COMMON, "*is_there = code == SQLITE_TOOBIG || patch.triangle_count > 0;", "*is_there = true;", TILES, "the same tiles"),
     ("tiles: squares of tiles are there when one is", LAYER, "if (cover == STORE_COVER_UNKNOWN && (r->x0", "if (false && (r->x0", TILES, "no others"),
     ("tiles: squares are a row short", LAYER, "y1 - y < SQUARE ? y1 : y + SQUARE - 1", "y1 - y < SQUARE ? y1 : y + SQUARE - 2", TILES, "no others"),
