@@ -9,14 +9,20 @@ tests/web/*.test.mjs, which runs with the mutant's command and extension. A text
 As many workers as there are processors, each with a copy of the tree; mutants of one program follow each other in one of them,
 whose objects are then mostly up to date. What was missed is said again at the end.
 """
+import contextlib
 import glob
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
+import threading
+import time
 from concurrent.futures import ThreadPoolExecutor
 from queue import Queue
+
+LONGEST = 300  # seconds of a test's run
 
 
 def read_mutants():
@@ -39,6 +45,40 @@ def copy_tree(build, tree):
                     ignore=shutil.ignore_patterns("mutants", "sanitized", "threads", "coverage", "fuzz", "lint", "bench", "chart", "peers", "demo", "web-shots", "*.log"))
 
 
+def kill_group(leader):
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(leader, signal.SIGKILL)
+
+
+def run_until_named(command, tree, environment, test, is_page):
+    """None when a line says that the test is red, when the program dies and when it hangs; otherwise its exit code.
+
+    What it would say after that line is not waited for: a code that is not 0 follows. But a page's browser outlives its test when
+    that is killed.
+    """
+    with subprocess.Popen(command, cwd=tree, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace", env=environment,
+                          start_new_session=True) as ran:
+        late = threading.Event()
+
+        def end():
+            late.set()
+            kill_group(ran.pid)
+
+        timer = threading.Timer(LONGEST, end)
+        timer.start()
+        is_named = False
+        try:
+            for line in ran.stdout:
+                is_named |= test in line and ("FAILED" in line or "ERROR" in line or line.startswith("not ok"))
+                if is_named and not is_page:
+                    end()
+            code = ran.wait()
+            return None if late.is_set() or code < 0 or (code and is_named) else code
+        finally:
+            timer.cancel()
+            kill_group(ran.pid)  # services that it left
+
+
 def run_mutant(tree, mutant):
     """What is wrong with it, or "" when it was caught."""
     what, path, old, new, program, test = mutant
@@ -48,7 +88,9 @@ def run_mutant(tree, mutant):
     if old not in text:
         return "not found in " + path
     absolute = os.path.abspath(tree)
-    environment = dict(os.environ, RQT_SEED="1", TMPDIR=absolute, RQT=absolute + "/build/rqt",
+    temporary = os.path.join(absolute, "temporary")
+    os.makedirs(temporary, exist_ok=True)
+    environment = dict(os.environ, RQT_SEED="1", TMPDIR=temporary, RQT=absolute + "/build/rqt",
                        RQT_SO=absolute + "/build/rqt.so")
     with open(target, "w", encoding="utf-8") as f:
         f.write(text.replace(old, new, 1))
@@ -59,20 +101,14 @@ def run_mutant(tree, mutant):
         made = subprocess.run(["make", "-s", "WARNINGS=", goal], cwd=tree, capture_output=True, text=True)
         if made.returncode:
             return "does not build:\n" + made.stderr[-1500:]
-        runner = ["node", "--test", "--test-reporter=tap", "--test-name-pattern=" + re.escape(test)] if page else ["/usr/bin/python3"]
+        runner = ["node", "--test", "--test-reporter=tap", "--test-name-pattern=" + re.escape(test)] if page else ["/usr/bin/python3", "-u"]
         command = runner + ["tests/" + program] if script else ["build/tests/" + program]
-        ran = subprocess.run(command, cwd=tree, capture_output=True, text=True, errors="replace",
-                             timeout=300 if script else 120, env=environment)
-        output = ran.stdout + ran.stderr
-        named = any(test in line and ("FAILED" in line or "ERROR" in line or line.startswith("not ok")) for line in output.splitlines())
-        if ran.returncode != 0 and (named or ran.returncode < 0):
-            return ""
-        return "SURVIVED " + program + (" (red, but not " + test + ")" if ran.returncode else "")
-    except subprocess.TimeoutExpired:
-        return ""
+        code = run_until_named(command, tree, environment, test, page)
+        return "" if code is None else "SURVIVED " + program + (" (red, but not " + test + ")" if code else "")
     finally:
         shutil.copy2(path, target)
         os.utime(target)
+        shutil.rmtree(temporary, ignore_errors=True)
 
 
 def main():
@@ -94,10 +130,11 @@ def main():
     def run_group(group):
         tree = trees.get()
         for mutant in group:
+            begun = time.monotonic()
             verdict = run_mutant(tree, mutant)
             if verdict:
                 missed.append("MISSED  %-48s %s" % (mutant[0], verdict))
-            print(missed[-1] if verdict else "caught  %-48s by %s" % (mutant[0], mutant[5]), flush=True)
+            print(missed[-1] if verdict else "caught  %-48s by %s, %.0f s" % (mutant[0], mutant[5], time.monotonic() - begun), flush=True)
         trees.put(tree)
         return len(group)
 
