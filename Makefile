@@ -22,7 +22,7 @@ SQL_HOSTED = $(patsubst %.c,$(BUILD)/hosted/%.o,$(SQL_SOURCES))
 SQL_LINKED = $(patsubst %.c,$(BUILD)/linked/%.o,$(SQL_SOURCES))
 IMPORT = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/import/*.c))
 PICTURE = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/picture/*.c src/text/*.c))
-TILES = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/tiles/*.c))
+TILES = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/tiles/*.c src/tiles/*/*.c))
 SERVE = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/serve/*.c)) $(BUILD)/generated/web_files.o
 CLI = $(patsubst src/%.c,$(BUILD)/%.o,$(wildcard src/cli/*.c))
 # What the query service has in it: its pages, and what it says of itself. The pages are the same in every build.
@@ -268,7 +268,7 @@ check-layers: ## modules depend one way only; librqt.a and rqt.so mention only w
 	@$(MAKE) --no-print-directory -j2 products
 	@BUILD=$(BUILD) ./tests/check_layers.sh
 
-FORMATTED = $(wildcard src/*/*.[ch] src/geo/*.cpp ext/*.[ch] tests/*.[ch] tests/*.cpp tests/web/*.[ch] tests/fuzz/*.[ch] tests/bench/*.[ch] tests/bench/peers/*.[ch])
+FORMATTED = $(wildcard src/*/*.[ch] src/tiles/*/*.[ch] src/geo/*.cpp ext/*.[ch] tests/*.[ch] tests/*.cpp tests/web/*.[ch] tests/fuzz/*.[ch] tests/bench/*.[ch] tests/bench/peers/*.[ch])
 .PHONY: format check-format
 format: ## lay the sources out (clang-format)
 	@./src/install-packages.sh format

@@ -29,14 +29,14 @@ may_see() {
 room_of_header() { # name, room that includes it
     for room in $2 core store format geo verify import ext text picture tiles serve cli; do
         dir=src/$room; [ "$room" = ext ] && dir=ext
-        [ -e "$dir/$1" ] && { echo "$room"; return; }
+        [ -n "$(find "$dir" -name "$1" -print -quit)" ] && { echo "$room"; return; }
     done
     echo system
 }
 wrong=
 for room in core store format geo verify import ext text picture tiles serve cli; do
     dir=src/$room; [ "$room" = ext ] && dir=ext
-    for file in "$dir"/*.[ch] "$dir"/*.cpp; do
+    for file in "$dir"/*.[ch] "$dir"/*/*.[ch] "$dir"/*.cpp; do
         [ -e "$file" ] || continue
         for header in $(sed -n 's/^#include "\(.*\)"/\1/p' "$file"); do
             [ "$header" = schema_sql.h ] && continue

@@ -24,7 +24,7 @@ tidy() {
     fi
 }
 export -f tidy
-sources=$(ls src/*/*.c src/geo/*.cpp ext/*.c)
+sources=$(ls src/*/*.c src/tiles/*/*.c src/geo/*.cpp ext/*.c)
 said=$({
     # The largest first. cppcheck is one more source: it takes as long as a few.
     # shellcheck disable=SC2086
@@ -36,7 +36,7 @@ passed=$(grep -c '^ok' <<<"$said") failed=$(grep -c '^FAILED' <<<"$said")
 # shellcheck disable=SC2086
 if cppcheck --enable=warning,performance,portability --inline-suppr --quiet -j 2 --std=c11 --language=c --error-exitcode=1 \
     --suppressions-list=tests/cppcheck.txt --suppress=unmatchedSuppression \
-    -DSQLITE_CORE -D__x86_64__ -D__GNUC__ $(printf '%s\n' $FLAGS | grep -E '^-I(src|ext|build)') src/*/*.c ext/*.c >"$logs/cppcheck.log" 2>&1; then
+    -DSQLITE_CORE -D__x86_64__ -D__GNUC__ $(printf '%s\n' $FLAGS | grep -E '^-I(src|ext|build)') src/*/*.c src/tiles/*/*.c ext/*.c >"$logs/cppcheck.log" 2>&1; then
     passed=$((passed + 1))
 else
     failed=$((failed + 1))

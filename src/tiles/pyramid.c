@@ -8,7 +8,7 @@
  * refused; while somebody works in it the file is locked. The document comes last, so a folder that has it is
  * complete.
  */
-#include "internal.h"
+#include "kind.h"
 
 #include <dirent.h>
 #include <errno.h>

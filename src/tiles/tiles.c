@@ -1,6 +1,6 @@
 /* tiles.c - kinds of tiles; a connection's tiles: the terrain that is meant, and what its kind has worked out of
  * it. */
-#include "internal.h"
+#include "kind.h"
 
 #include <cjson/cJSON.h>
 #include <math.h>
@@ -100,6 +100,15 @@ void tiles_add_attribution(const store_terrain *t, cJSON *document) {
     cJSON_AddStringToObject(document, "attribution", all ? all : "");
     sqlite3_free(all);
     sqlite3_free(line);
+}
+
+void tiles_add_bounds(const store_terrain *t, double most_latitude, cJSON *document) {
+    const geo_extent e = tiles_extent(t);
+    const double turns = floor((e.west + 180) / 360), west = e.west - 360 * turns, east = e.east - 360 * turns;
+    const bool is_across = east > 180;
+    const double bounds[4] = {is_across ? -180 : west, fmin(fmax(e.south, -most_latitude), most_latitude),
+                              is_across ? 180 : east, fmin(fmax(e.north, -most_latitude), most_latitude)};
+    cJSON_AddItemToObject(document, "bounds", cJSON_CreateDoubleArray(bounds, 4));
 }
 
 int tiles_print(cJSON *document, tile_bytes *out) {

@@ -1,7 +1,8 @@
 """Mutants of the page /cesium and of what Cesium needs of the tiles: see ../mutants.py."""
 
 CESIUM, TILES, SERVE = "web/cesium.test.mjs", "test_tiles.py", "test_serve.py"
-LAYER, ENCODE, KIND, PYRAMID, SPECK, MESH = ("src/tiles/%s.c" % name for name in ("layer", "encode", "quantized_mesh", "pyramid", "speck", "mesh"))
+LAYER, ENCODE, KIND, SPECK, MESH = ("src/tiles/quantized_mesh/%s.c" % name for name in ("layer", "encode", "quantized_mesh", "speck", "mesh"))
+PYRAMID = "src/tiles/pyramid.c"
 GLOBE, TILESET = ("src/web/cesium/%s.js" % name for name in ("globe", "tileset"))
 
 MUTANTS = [

@@ -1,7 +1,8 @@
 """Mutants of what the judge of tiles found, and of what it alone looks at: see ../mutants.py."""
 
 JUDGE = "test_verify_tiles.py"
-SEAM, PLAN, GLOBE, TILES, MESH, ENDPOINTS = ("src/tiles/seam.c", "src/tiles/plan.c", "src/tiles/globe.c", "src/tiles/tiles.c", "src/tiles/mesh.c", "src/serve/endpoints.c")
+SEAM, PLAN, GLOBE, MESH = ("src/tiles/quantized_mesh/%s.c" % name for name in ("seam", "plan", "globe", "mesh"))
+TILES, ENDPOINTS = "src/tiles/tiles.c", "src/serve/endpoints.c"
 
 MUTANTS = [
     ("judge: the antimeridian has vertices of one side", SEAM, "if (on[y] == on[h + y] || forced[lacks * h + y]) continue;", "if (y >= 0) continue;", JUDGE, "F28_a_ring_of_rough"),

@@ -1,7 +1,7 @@
 """Mutants of the tiles for maps: see ../mutants.py."""
 
 TERRARIUM = "test_terrarium.py"
-KIND, PIXELS, SAMPLES, LATTICE, PROOF, PNG = ("src/tiles/terrarium%s.c" % name for name in ("", "_pixels", "_samples", "_lattice", "_proof", "_png"))
+KIND, PIXELS, SAMPLES, LATTICE, PROOF, PNG = ("src/tiles/terrarium/%s.c" % name for name in ("terrarium", "pixels", "samples", "lattice", "proof", "png"))
 SERVE = "src/serve/tiles.c"
 
 MUTANTS = [

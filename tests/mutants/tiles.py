@@ -1,7 +1,8 @@
 """Mutants of the tiles: see ../mutants.py."""
 
 COMMON, TILES, COVERED = "src/tiles/tiles.c", "test_tiles.py", "boxes_are_covered_as_the_mesh_covers_them"
-PLAN, MESH, GLOBE, WATER, ENCODE, LAYER, PYRAMID = ("src/tiles/%s.c" % name for name in ("plan", "mesh", "globe", "water", "encode", "layer", "pyramid"))
+PLAN, MESH, GLOBE, WATER, ENCODE, LAYER = ("src/tiles/quantized_mesh/%s.c" % name for name in ("plan", "mesh", "globe", "water", "encode", "layer"))
+PYRAMID, EARTH = "src/tiles/pyramid.c", "src/tiles/earth.c"
 
 MUTANTS = [
     # errors
@@ -28,7 +29,8 @@ MUTANTS = [
     ("tiles: the sphere is a hair too small", GLOBE, "globe->radius = sqrt(most) * (1 + 1e-9) + 1e-6;", "globe->radius = sqrt(most) * (1 - 1e-7);", TILES, "spheres hold every vertex"),
     ("tiles: heights do not rise over the horizon", GLOBE, "(along - across * sqrt(m2 - 1)) / sqrt(m2)", "along", TILES, "below the horizon"),
     ("tiles: the horizon's point is the centre", GLOBE, "if (exists && 1 / cosine > most) most = 1 / cosine;", "most = 1;", TILES, "below the horizon"),
-    ("tiles: normals are not turned into space", GLOBE, "turn(&globe->angles[i], enu, n);", "memcpy(n, enu, sizeof n);", TILES, "normals are the terrain's"),
+    ("tiles: normals are not turned into space", GLOBE, "earth_turn(&globe->angles[i].lon, &globe->angles[i].lat, enu, n);", "memcpy(n, enu, sizeof n);", TILES, "normals are the terrain's"),
+    ("tiles: directions are mirrored about the equator", EARTH, "lat->cosine * enu[2] - lat->sine * enu[1];", "lat->cosine * enu[2] + lat->sine * enu[1];", TILES, "normals are the terrain's"),
     ("tiles: normals of a side are one sample's", GLOBE, "if (weight <= 0) continue;", "if (weight <= 0 || a.count > 0) continue;", TILES, "the mean of those around"),
     ("tiles: heights are the geoid's", PLAN, "    if (is_above_geoid)\n        plan->geoid = frame;\n    else\n        geo_frame_free(frame);", "    geo_frame_free(frame);", TILES, "geoid: no sample"),
     # bytes

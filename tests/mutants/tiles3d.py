@@ -1,7 +1,7 @@
 """Mutants of 3D Tiles: see ../mutants.py."""
 
 TILES = "test_tiles3d.py"
-PLAN, TILE, MESH, GLB, SUBTREE, TILESET = ("src/tiles/%s.c" % name for name in ("block_plan", "block_tile", "block_mesh", "block_glb", "subtree", "tileset"))
+PLAN, TILE, MESH, GLB, SUBTREE, TILESET = ("src/tiles/blocks/%s.c" % name for name in ("plan", "tile", "mesh", "glb", "subtree", "tileset"))
 RELIEF = "src/store/relief.c"
 
 MUTANTS = [
@@ -26,7 +26,7 @@ MUTANTS = [
     ("3d-tiles: regions do not sink with their chords", TILE, "region[4] = relief->lowest + low - moved;", "region[4] = relief->lowest + low;", TILES, "lie in their regions"),
     ("3d-tiles: regions do not bulge to the pole", TILE, "box[3] + bulge, region", "box[3], region", TILES, "lie in their regions"),
     ("3d-tiles: a tile knows no more than the terrain", SUBTREE, "int code = block_relief(t, tile, relief, error);", "int code = SQLITE_OK;", TILES, "a tile tells the error"),
-    ("3d-tiles: heights are the geoid's", MESH, "geo_frame_height(block_plan_of(t)->frame, place);", "place[2];", TILES, "geoid: every vertex is a sample"),
+    ("3d-tiles: heights are the geoid's", MESH, "geo_frame_height(block_plan_of(t)->frame, place)", "place[2]", TILES, "geoid: every vertex is a sample"),
     ("3d-tiles: regions are the geoid's", TILE, "region[5] = relief->highest + high + moved;", "region[5] = relief->highest + moved;", TILES, "geoid: tiles lie in their regions"),
     ("3d-tiles: longitudes go on beyond 180", TILE, "if (east > 180) east", "if (east > 1000) east", TILES, "regions are on the globe"),
     # availability

@@ -1,4 +1,4 @@
-/* terrarium_png.c - pixels as PNG (ISO 15948): red, green, blue of 8 bits, without alpha, for browsers multiply
+/* png.c - pixels as PNG (ISO 15948): red, green, blue of 8 bits, without alpha, for browsers multiply
  * colours by it. What the tile is off and how many of its pixels are void stands in two tEXt chunks before the
  * pixels.
  *

@@ -5,12 +5,12 @@
  *   tiles, contents and subtrees below is not all or nothing, a bit each, each from a multiple of 8 bytes on
  *
  * Tiles come level by level, and in a level along the Morton curve, x in the even bits, y from the south in the
- * odd. Those that are there have the errors and regions of block_tile.c, in that order.
+ * odd. Those that are there have the errors and regions of tile.c, in that order.
  *
  * A tile is there iff its block is stored, its content iff the mesh has a triangle. All of it is known from the
  * index, but for contents where there are voids: those are looked for, each up to the first triangle.
  */
-#include "block.h"
+#include "blocks.h"
 
 #include <cjson/cJSON.h>
 #include <string.h>

@@ -1,4 +1,4 @@
-/* terrarium_leaves.h - blocks as meshes among the pixels of a tile: what drawing and proving have in common. */
+/* leaves.h - blocks as meshes among the pixels of a tile: what drawing and proving have in common. */
 #ifndef RQT_TILES_TERRARIUM_LEAVES_H
 #define RQT_TILES_TERRARIUM_LEAVES_H
 
@@ -99,7 +99,7 @@ typedef int visit_block(tiles *t, const rqt_block_place *place, rqt_block_number
                         char **error);
 int lattice_visit(tiles *t, int level, pixel_grid *g, visit_block *visit, void *context, char **error);
 
-/* When all is drawn by the blocks of a level: the error. terrarium_proof.c */
+/* When all is drawn by the blocks of a level: the error. proof.c */
 int leaves_prove(tiles *t, int level, pixel_grid *g, char **error);
 
 #endif

@@ -17,46 +17,28 @@
  * geocentric; between samples, where a side cuts a triangle, they are the mean of the four around by nearness. What
  * neighbours share depends on the place alone. Specks have the ellipsoid's.
  */
+#include "earth.h"
 #include "quantized_mesh.h"
 
 #include <math.h>
 #include <string.h>
 
-#define DEGREE 0.017453292519943295
-#define A 6378137.0
-#define F (1 / 298.257223563)
-#define B (A * (1 - F))
 #define NEVER_HIDDEN 1e200
 
 static double dot(const double a[3], const double b[3]) {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* Vertices have few longitudes and latitudes: each is kept for the next that has it. */
-enum { KEPT_ANGLES = 1024 };
-typedef struct kept_angle {
-    double degrees, sine, cosine;
-} kept_angle;
-
-static const kept_angle *find_angle(kept_angle kept[KEPT_ANGLES], uint16_t number, double degrees) {
-    kept_angle *k = &kept[number % KEPT_ANGLES];
-    if (k->degrees != degrees) *k = (kept_angle){degrees, sin(degrees * DEGREE), cos(degrees * DEGREE)};
-    return k;
-}
-
 static void place_all(const tile_mesh *mesh, tile_globe *globe) {
-    const double e2 = F * (2 - F);
-    kept_angle lons[KEPT_ANGLES], lats[KEPT_ANGLES];
-    for (int i = 0; i < KEPT_ANGLES; i++) lons[i] = lats[i] = (kept_angle){.cosine = 1};
+    earth_angles lons, lats;
+    earth_angles_clear(&lons);
+    earth_angles_clear(&lats);
     for (size_t i = 0; i < mesh_vertices(mesh); i++) {
         const double *p = mesh->lonlath + 3 * i;
-        const kept_angle *lon = find_angle(lons, mesh->u[i], p[0] < 180 ? p[0] : p[0] - 360),
-                         *lat = find_angle(lats, mesh->v[i], p[1]);
-        const double n = A / sqrt(1 - e2 * lat->sine * lat->sine);
-        globe->angles[i] = (tile_angles){lon->sine, lon->cosine, lat->sine, lat->cosine};
-        globe->xyz[3 * i] = (n + p[2]) * lat->cosine * lon->cosine;
-        globe->xyz[3 * i + 1] = (n + p[2]) * lat->cosine * lon->sine;
-        globe->xyz[3 * i + 2] = (n * (1 - e2) + p[2]) * lat->sine;
+        const earth_angle *lon = earth_angle_of(&lons, mesh->u[i], p[0] < 180 ? p[0] : p[0] - 360),
+                          *lat = earth_angle_of(&lats, mesh->v[i], p[1]);
+        globe->angles[i] = (tile_angles){*lon, *lat};
+        earth_place(lon, lat, p[2], globe->xyz + 3 * i);
     }
 }
 
@@ -79,12 +61,13 @@ static void find_sphere(const double *xyz, size_t count, tile_globe *globe) {
 }
 
 static void find_horizon(const double *xyz, size_t count, tile_globe *globe) {
-    double direction[3] = {globe->centre[0] / A, globe->centre[1] / A, globe->centre[2] / B}, most = 0;
+    double direction[3] = {globe->centre[0] / EARTH_A, globe->centre[1] / EARTH_A, globe->centre[2] / EARTH_B},
+           most = 0;
     const double length = sqrt(dot(direction, direction));
     bool exists = length > 0;
     for (int k = 0; k < 3; k++) direction[k] = exists ? direction[k] / length : k == 0;
     for (size_t i = 0; i < count && exists; i++) {
-        const double p[3] = {xyz[3 * i] / A, xyz[3 * i + 1] / A, xyz[3 * i + 2] / B};
+        const double p[3] = {xyz[3 * i] / EARTH_A, xyz[3 * i + 1] / EARTH_A, xyz[3 * i + 2] / EARTH_B};
         const double square = dot(p, p), m2 = square > 1 ? square : 1, along = dot(p, direction) / sqrt(square);
         const double across = along < 1 ? sqrt(1 - along * along) : 0; /* of the angle t */
         /* cos(t + acos(1/m)) */
@@ -155,14 +138,6 @@ static void pack(const double n[3], uint8_t packed[2]) {
     packed[1] = to_byte(y);
 }
 
-/* From east, north, up at a place. */
-static void turn(const tile_angles *at, const double enu[3], double out[3]) {
-    const double outward = at->cos_lat * enu[2] - at->sin_lat * enu[1]; /* from the axis */
-    out[0] = at->cos_lon * outward - at->sin_lon * enu[0];
-    out[1] = at->sin_lon * outward + at->cos_lon * enu[0];
-    out[2] = at->cos_lat * enu[1] + at->sin_lat * enu[2];
-}
-
 int globe_normals(tiles *t, const tile_mesh *mesh, const tile_globe *globe, uint8_t *packed, char **error) {
     const size_t count = mesh->cut.vertex_count;
     rqt_patch samples = {.vertices = sqlite3_malloc64((4 * count + 1) * sizeof *samples.vertices)};
@@ -178,12 +153,12 @@ int globe_normals(tiles *t, const tile_mesh *mesh, const tile_globe *globe, uint
         double enu[3] = {0}, n[3];
         for (int k = 0; k < all[i].count; k++, next += 3)
             for (int c = 0; c < 3; c++) enu[c] += (double)all[i].weight[k] * (double)next[c];
-        turn(&globe->angles[i], enu, n);
+        earth_turn(&globe->angles[i].lon, &globe->angles[i].lat, enu, n);
         pack(n, packed + 2 * i);
     }
     for (size_t i = count; i < mesh_vertices(mesh) && code == SQLITE_OK; i++) {
         double n[3];
-        turn(&globe->angles[i], (const double[3]){0, 0, 1}, n);
+        earth_turn(&globe->angles[i].lon, &globe->angles[i].lat, (const double[3]){0, 0, 1}, n);
         pack(n, packed + 2 * i);
     }
     sqlite3_free(normals);

@@ -1,8 +1,8 @@
-/* block_plan.c - what all tiles of a terrain have in common: how far each level is off, and the steps in which its
+/* plan.c - what all tiles of a terrain have in common: how far each level is off, and the steps in which its
  * vertices are placed.
  *
  * The mesh of a level. A tile is the cell of a stored block; the mesh of a level is one mesh of the terrain, by one
- * rule, in which the corners of all cells of the level are forced (block_mesh.c): then no leaf crosses the side of
+ * rule, in which the corners of all cells of the level are forced (mesh.c): then no leaf crosses the side of
  * a cell, and tiles of a level are parts of one mesh, edge for edge. What is forced by a cell's corners are corners
  * of cells, so each tile forces its own and nothing else. Vertices are samples as they are stored.
  *
@@ -38,13 +38,12 @@
  * 2^24. The step is the least, from 2^-13 m on, for which no tile of the level is larger than that. Rounding moves
  * a vertex by no more than sqrt(3)/2 step, and so any place of a triangle.
  */
-#include "block.h"
+#include "blocks.h"
+#include "earth.h"
 
 #include <math.h>
 #include <string.h>
 
-#define DEGREE 0.017453292519943295
-#define CURVED 6399593.7    /* the largest radius of curvature of WGS 84: at the poles */
 #define GEOID_HIGHEST 120.0 /* EGM96 lies between -107 and 86 */
 enum { FIRST_STEP = -13, STEP_BITS = 24, FINER = 2 };
 #define STRIDES_PER_ERROR 4
@@ -71,8 +70,8 @@ static double size_of_tiles(const store_terrain *t, const geo_extent *e, int l) 
     const int32_t side = 1 << (t->lattice.K - l);
     const double height = fmax(fabs(e->lowest), fabs(e->highest)) + GEOID_HIGHEST;
     const double columns = fmin(side, t->lattice.width - 1), rows = fmin(side, t->lattice.height - 1);
-    const double ground = (CURVED + height) * DEGREE * hypot(columns * e->lon_step, rows * e->lat_step);
-    return fmin(ground, 2 * (CURVED + height)) + e->highest - e->lowest + 2 * GEOID_HIGHEST;
+    const double ground = (EARTH_CURVED + height) * DEGREE * hypot(columns * e->lon_step, rows * e->lat_step);
+    return fmin(ground, 2 * (EARTH_CURVED + height)) + e->highest - e->lowest + 2 * GEOID_HIGHEST;
 }
 
 static void set_levels(const store_terrain *t, const rqt_code largest[RQT_MAX_K + 1], block_plan *plan) {

@@ -1,12 +1,14 @@
-/* internal.h - what the kinds of tiles have in common.
+/* kind.h - what the kinds of tiles have in common.
  *
- *   tiles.c    kinds; a connection's tiles: the plan of its terrain, kept while nothing changes
- *   pyramid.c  to disk
- *
- * and of each kind, told in a header of its own: quantized_mesh.h, block.h (3d-tiles), terrarium.h.
+ *   tiles.c          kinds; a connection's tiles: the plan of its terrain, kept while nothing changes
+ *   pyramid.c        to disk
+ *   earth.c          places and directions in space
+ *   quantized_mesh/  each kind in a folder of its own, its parts told in its header
+ *   blocks/          (3d-tiles)
+ *   terrarium/
  */
-#ifndef RQT_TILES_INTERNAL_H
-#define RQT_TILES_INTERNAL_H
+#ifndef RQT_TILES_KIND_H
+#define RQT_TILES_KIND_H
 
 #include "geo.h"
 #include "tiles.h"
@@ -58,6 +60,9 @@ char *tiles_attribution(const store_terrain *t);
 /* The same as "attribution" of a document. Clients take it for HTML, which names of files are not. */
 struct cJSON;
 void tiles_add_attribution(const store_terrain *t, struct cJSON *document);
+/* Where the terrain lies, as "bounds" of a document; no further from the equator than most_latitude. Longitudes of
+ * -180..180. Across the antimeridian it is all of them: clients know no other way to say it. */
+void tiles_add_bounds(const store_terrain *t, double most_latitude, struct cJSON *document);
 /* The document's text as the answer; releases it and the JSON. */
 int tiles_print(struct cJSON *document, tile_bytes *out);
 /* Has the mesh of eps a triangle in a region? Looks no further than the first. */

@@ -205,17 +205,6 @@ int layer_below(tiles *t, int32_t x, char **text, char **error) {
     return code != SQLITE_OK ? code : *text ? SQLITE_OK : SQLITE_NOMEM;
 }
 
-/* Longitudes of -180..180. Across the antimeridian it is all of them: clients know no other way to say it. */
-static void add_bounds(const store_terrain *t, cJSON *layer) {
-    const rqt_placement *at = &t->placement;
-    const double width = (t->lattice.width - 1) * at->dx, turns = floor((at->x0 + 180) / 360);
-    const double west = at->x0 - 360 * turns, east = west + width;
-    const bool is_across = east > 180;
-    const double bounds[4] = {is_across ? -180 : west, at->y0 + (t->lattice.height - 1) * at->dy,
-                              is_across ? 180 : east, at->y0};
-    cJSON_AddItemToObject(layer, "bounds", cJSON_CreateDoubleArray(bounds, 4));
-}
-
 static cJSON *describe(const tiles *t, int first, int last) {
     const char *const templates[] = {"{z}/{x}/{y}.terrain"}, *const extensions[] = {"octvertexnormals", "metadata",
                                                                                     "watermask"};
@@ -232,7 +221,7 @@ static cJSON *describe(const tiles *t, int first, int last) {
     cJSON_AddNumberToObject(layer, "minzoom", first);
     cJSON_AddNumberToObject(layer, "maxzoom", last);
     if (first == 0) cJSON_AddNumberToObject(layer, "metadataAvailability", last + 1);
-    add_bounds(t->terrain, layer);
+    tiles_add_bounds(t->terrain, 90, layer);
     tiles_add_attribution(t->terrain, layer);
     /* For people: what clients take each level to be off, and the part that the mesh has of it. */
     for (int z = 0; z <= last; z++) {

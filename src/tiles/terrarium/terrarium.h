@@ -1,17 +1,17 @@
 /* terrarium.h - the parts of the kind terrarium.
  *
- *   terrarium.c          levels, which tiles there are, tile.json
- *   terrarium_pixels.c   where pixels lie; their heights, void ones, what is between them
- *   terrarium_samples.c  heights where the mesh has every sample, and how far the samples are from what is drawn
- *   terrarium_lattice.c  blocks as heights at the vertices of their lattice, among the pixels
- *   terrarium_leaves.c   heights where the mesh is coarser
- *   terrarium_proof.c    how far the samples are from what is drawn, there
- *   terrarium_png.c      bytes
+ *   terrarium.c  levels, which tiles there are, tile.json
+ *   pixels.c     where pixels lie; their heights, void ones, what is between them
+ *   samples.c    heights where the mesh has every sample, and how far the samples are from what is drawn
+ *   lattice.c    blocks as heights at the vertices of their lattice, among the pixels
+ *   leaves.c     heights where the mesh is coarser
+ *   proof.c      how far the samples are from what is drawn, there
+ *   png.c        bytes
  */
 #ifndef RQT_TILES_TERRARIUM_H
 #define RQT_TILES_TERRARIUM_H
 
-#include "internal.h"
+#include "kind.h"
 
 enum { PIXELS = 256, GRID = PIXELS + 2 };
 

@@ -32,13 +32,13 @@
  * heights of corners are H + G(place), and G is not linear in between: that adds what it may differ by within the
  * largest triangle, and along the move.
  */
+#include "earth.h"
 #include "quantized_mesh.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#define DEGREE 0.017453292519943295
 /* Samples are on a grid of 2^-20 with the sides; places where a side cuts an edge are within 2^-30 of it. */
 #define ON_SIDE 0x1p-21
 enum { WEST, SOUTH, EAST, NORTH, SIDES };

@@ -14,14 +14,13 @@
  *
  * Every tile that meets the raster is there, if all of it is void too: clients know nothing but bounds.
  */
+#include "earth.h"
 #include "terrarium.h"
 
 #include <cjson/cJSON.h>
 #include <math.h>
 #include <string.h>
 
-#define DEGREE 0.017453292519943295
-#define EQUATOR 6378137.0
 #define MOST_LATITUDE 85.0511287798066 /* of the square that is the world */
 #define STEPS 1024
 
@@ -104,7 +103,7 @@ static int plan_create_pixels(tiles *t, void **out, char **error) {
                      high = 360 / ldexp(PIXELS, z) * cos(nearest * DEGREE) / e.lat_step;
         plan->finest = z;
         plan->shift[z] = (int)fmax(floor(log2(wide * high) / 2), 0);
-        plan->step[z] = ldexp(1, (int)floor(log2(2 * M_PI * EQUATOR / ldexp(PIXELS, z) / STEPS)));
+        plan->step[z] = ldexp(1, (int)floor(log2(2 * M_PI * EARTH_A / ldexp(PIXELS, z) / STEPS)));
         plan->step[z] = fmin(fmax(plan->step[z], 1.0 / 256), 1);
         plan->range_count[z] = find_ranges(terrain, z, plan->ranges[z]);
         if (wide <= 1 && high <= 1) break;
@@ -144,16 +143,6 @@ static int make(tiles *t, int series, int z, int32_t x, int32_t y, tile_bytes *o
 
 /* ----------------------------------------------------------------------------------------------- tile.json -- */
 
-/* Longitudes of -180..180: across the antimeridian it is all of them. */
-static void add_bounds(const store_terrain *t, cJSON *document) {
-    const geo_extent e = tiles_extent(t);
-    const double turns = floor((e.west + 180) / 360), west = e.west - 360 * turns, east = e.east - 360 * turns;
-    const bool is_across = east > 180;
-    const double bounds[4] = {is_across ? -180 : west, clamp_latitude(e.south), is_across ? 180 : east,
-                              clamp_latitude(e.north)};
-    cJSON_AddItemToObject(document, "bounds", cJSON_CreateDoubleArray(bounds, 4));
-}
-
 static int document(tiles *t, const char *root, int first, int last, tile_bytes *out, char **error) {
     char *address = sqlite3_mprintf("%s{z}/{x}/{y}.png", root);
     const char *const addresses[] = {address};
@@ -167,7 +156,7 @@ static int document(tiles *t, const char *root, int first, int last, tile_bytes 
     cJSON_AddItemToObject(json, "tiles", cJSON_CreateStringArray(addresses, 1));
     cJSON_AddNumberToObject(json, "minzoom", first);
     cJSON_AddNumberToObject(json, "maxzoom", last);
-    add_bounds(t->terrain, json);
+    tiles_add_bounds(t->terrain, MOST_LATITUDE, json);
     tiles_add_attribution(t->terrain, json);
     cJSON_AddStringToObject(json, "encoding", "terrarium");
     cJSON_AddNumberToObject(json, "tileSize", PIXELS);

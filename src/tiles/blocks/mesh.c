@@ -1,4 +1,4 @@
-/* block_mesh.c - the mesh of a tile: the terrain's own at the level's error, in the cell of a block, its corners
+/* mesh.c - the mesh of a tile: the terrain's own at the level's error, in the cell of a block, its corners
  * forced. And its vertices in space.
  *
  * The rule is lowered by rank by what curvature takes; a rank of which curvature takes more than the level has to
@@ -10,15 +10,12 @@
  * rounded to the same steps, but for one that lies on the very edge between two; sines and cosines are off by 1e-9
  * m there.
  */
-#include "block.h"
+#include "blocks.h"
+#include "earth.h"
 
 #include <math.h>
-#include <string.h>
 
-#define DEGREE 0.017453292519943295
 #define BEYOND_POLE (90 * (1 + 1e-9)) /* a row at a pole, by a rounding */
-#define A 6378137.0
-#define F (1 / 298.257223563)
 enum { NORMAL_UNITS = 127 };
 enum { CORNER = 16 }; /* of a side, one part */
 
@@ -114,59 +111,39 @@ int block_has_triangle(tiles *t, block_tile tile, bool *has, char **error) {
 
 /* ------------------------------------------------------------------------------------------------ in space -- */
 
-/* Vertices have few columns and rows: the angle of each is kept for the next that has it. */
-enum { KEPT_ANGLES = 1024 };
-typedef struct angle {
-    int32_t number; /* of the column or row */
-    bool is_known;
-    double degrees, sine, cosine;
-} angle;
 typedef struct angles {
-    angle lon[KEPT_ANGLES], lat[KEPT_ANGLES];
+    earth_angles lon, lat;
 } angles;
-
-static const angle *find_angle(angle kept[KEPT_ANGLES], int32_t number, double degrees) {
-    angle *k = &kept[number % KEPT_ANGLES];
-    if (!k->is_known || k->number != number)
-        *k = (angle){number, true, degrees, sin(degrees * DEGREE), cos(degrees * DEGREE)};
-    return k;
-}
 
 static double latitude(const rqt_placement *at, int32_t row) {
     const double degrees = at->y0 + row * at->dy;
     return fabs(degrees) > 90 && fabs(degrees) <= BEYOND_POLE ? copysign(90, degrees) : degrees;
 }
 
-static int place_vertex(const tiles *t, const rqt_patch_vertex *v, const angle *lon, const angle *lat,
+static int place_vertex(const tiles *t, const rqt_patch_vertex *v, const earth_angle *lon, const earth_angle *lat,
                         double xyz[3], char **error) {
-    const double e2 = F * (2 - F), n = A / sqrt(1 - e2 * lat->sine * lat->sine);
     const double place[3] = {lon->degrees, lat->degrees, rqt_unit_metres(&t->terrain->unit, v->q)};
-    const double height = geo_frame_height(block_plan_of(t)->frame, place);
-    xyz[0] = (n + height) * lat->cosine * lon->cosine;
-    xyz[1] = (n + height) * lat->cosine * lon->sine;
-    xyz[2] = (n * (1 - e2) + height) * lat->sine;
+    earth_place(lon, lat, geo_frame_height(block_plan_of(t)->frame, place), xyz);
     if (fabs(lat->degrees) <= 90 && isfinite(xyz[0]) && isfinite(xyz[1]) && isfinite(xyz[2])) return SQLITE_OK;
     return tiles_fail(error, "terrain %s has no place in space at %.15g, %.15g", t->terrain->name, lon->degrees,
                       lat->degrees);
 }
 
-/* From east, north, up at a place. */
-static void turn_normal(const angle *lon, const angle *lat, const float enu[3], int8_t out[3]) {
-    const double east = (double)enu[0], north = (double)enu[1], up = (double)enu[2];
-    const double outward = lat->cosine * up - lat->sine * north; /* from the axis */
-    out[0] = (int8_t)rint(NORMAL_UNITS * (lon->cosine * outward - lon->sine * east));
-    out[1] = (int8_t)rint(NORMAL_UNITS * (lon->sine * outward + lon->cosine * east));
-    out[2] = (int8_t)rint(NORMAL_UNITS * (lat->cosine * north + lat->sine * up));
+static void turn_normal(const earth_angle *lon, const earth_angle *lat, const float enu[3], int8_t out[3]) {
+    double normal[3];
+    earth_turn(lon, lat, (const double[3]){(double)enu[0], (double)enu[1], (double)enu[2]}, normal);
+    for (int k = 0; k < 3; k++) out[k] = (int8_t)rint(NORMAL_UNITS * normal[k]);
 }
 
 static int place_all(const tiles *t, const float *enu, angles *known, double *xyz, block_mesh *mesh, char **error) {
     const rqt_placement *at = &t->terrain->placement;
     int code = SQLITE_OK;
-    memset(known, 0, sizeof *known);
+    earth_angles_clear(&known->lon);
+    earth_angles_clear(&known->lat);
     for (size_t i = 0; i < mesh->patch.vertex_count && code == SQLITE_OK; i++) {
         const rqt_patch_vertex *v = &mesh->patch.vertices[i];
-        const angle *lon = find_angle(known->lon, v->col, at->x0 + v->col * at->dx),
-                    *lat = find_angle(known->lat, v->row, latitude(at, v->row));
+        const earth_angle *lon = earth_angle_of(&known->lon, v->col, at->x0 + v->col * at->dx),
+                          *lat = earth_angle_of(&known->lat, v->row, latitude(at, v->row));
         code = place_vertex(t, v, lon, lat, xyz + 3 * i, error);
         turn_normal(lon, lat, enu + 3 * i, mesh->normal + 3 * i);
     }

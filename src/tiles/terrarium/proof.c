@@ -1,7 +1,7 @@
-/* terrarium_proof.c - how far every sample is from what clients draw, without looking at every sample.
+/* proof.c - how far every sample is from what clients draw, without looking at every sample.
  *
  * Let B be what is drawn. A valid sample in a leaf with three valid corners is no further from it than e + sup |F -
- * B|, e being em of the block (terrarium_leaves.c) and F the mesh. Instead of B we look at B', which has the same
+ * B|, e being em of the block (leaves.c) and F the mesh. Instead of B we look at B', which has the same
  * pixels and is bilinear between them in longitude and latitude: on a strip between two rows of pixels the share of
  * the lower row differs by at most
  *
@@ -27,11 +27,11 @@
  * In a child samples may be in leaves without a height though they are in one with three corners of its parent's:
  * then what was found for the parent holds.
  */
-#include "terrarium_leaves.h"
+#include "earth.h"
+#include "leaves.h"
 
 #include <math.h>
 
-#define DEGREE 0.017453292519943295
 #define ROUNDED 1e-4 /* metres: what doubles and SLACK are */
 #define TIGHT 1.25
 enum { MOST_SPLITS = 1200, BOX = 8 };

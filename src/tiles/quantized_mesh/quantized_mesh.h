@@ -13,7 +13,8 @@
 #ifndef RQT_TILES_QUANTIZED_MESH_H
 #define RQT_TILES_QUANTIZED_MESH_H
 
-#include "internal.h"
+#include "earth.h"
+#include "kind.h"
 
 enum { TILE_UNITS = 32767 }; /* a tile's side, and the range of heights, in what is stored */
 
@@ -108,9 +109,9 @@ void mesh_free(tile_mesh *mesh);
 /* Where the tile has no terrain; u, v, h have room for MOST_SPECKS more. */
 void specks_add(tile_mesh *mesh);
 
-/* Where a vertex is on the globe: sines and cosines of its longitude and latitude. */
+/* Where a vertex is on the globe. */
 typedef struct tile_angles {
-    double sin_lon, cos_lon, sin_lat, cos_lat;
+    earth_angle lon, lat;
 } tile_angles;
 typedef struct tile_globe {
     double *xyz;         /* geocentric, of each vertex */

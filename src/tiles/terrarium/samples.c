@@ -1,14 +1,14 @@
-/* terrarium_samples.c - pixels of the levels that have pixels about as large as samples: on the full-resolution
+/* samples.c - pixels of the levels that have pixels about as large as samples: on the full-resolution
  * mesh, as rqt_height has it, and the error measured at every sample.
  *
  * Both are loops over what lies around the tile, one window of samples, some 512 x 512 of them at most.
  */
+#include "earth.h"
 #include "terrarium.h"
 
 #include <math.h>
 #include <string.h>
 
-#define DEGREE 0.017453292519943295
 #define ROUNDED 1e-6 /* metres that doubles of places and heights may be off */
 
 typedef struct window {

@@ -1,4 +1,4 @@
-/* terrarium_pixels.c - where the pixels of a tile lie, what their heights are told as, and what clients draw
+/* pixels.c - where the pixels of a tile lie, what their heights are told as, and what clients draw
  * between them.
  *
  * Places. Pixel (X,Y) of level z, counted over all tiles from 180 degrees west and from the north, has its centre
@@ -16,12 +16,12 @@
  * no height, void or beyond the raster, as other terrain services have it; terrain at 0 m is told a step higher. So
  * whoever wants to can tell them apart, and those who cannot see the sea's level.
  */
+#include "earth.h"
 #include "terrarium.h"
 
 #include <math.h>
 #include <string.h>
 
-#define DEGREE 0.017453292519943295
 enum { LOWEST = -32768, CODES = 1 << 24, PER_METRE = 256 };
 
 void pixels_place(const tiles *t, int z, int32_t x, int32_t y, pixel_grid *g) {

@@ -25,17 +25,15 @@
  * rounded, and once more to 2^-20 sample, as regions are: functions of the side alone, so that neighbours have it
  * in common.
  */
+#include "earth.h"
 #include "quantized_mesh.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
-#define DEGREE 0.017453292519943295
-#define EQUATOR 6378137.0
-#define CURVED 6399593.7    /* the largest radius of curvature of WGS 84: at the poles */
 #define GEOID_HIGHEST 120.0 /* EGM96 lies between -107 and 86 */
-#define ROOT_ERROR (EQUATOR * 2 * M_PI * 0.25 / (65 * 2))
+#define ROOT_ERROR (EARTH_A * 2 * M_PI * 0.25 / (65 * 2))
 enum { LARGEST_TILE = 64, FIRST_STEP = -10, UNIT_BITS = 20 };
 #define LAST_EPS 0.625              /* quanta of height */
 #define FARTHEST ((int64_t)1 << 60) /* units: as regions have it */
@@ -79,7 +77,7 @@ static void set_heights(const store_terrain *t, tile_plan *plan) {
         if ((high - plan->lowest) / plan->step > TILE_UNITS) continue;
         if (fabs(plan->lowest) / plan->step + TILE_UNITS < 1 << 24) break;
     }
-    plan->radius = CURVED + fmax(fabs(low), fabs(high)) + (plan->geoid ? GEOID_HIGHEST : 0);
+    plan->radius = EARTH_CURVED + fmax(fabs(low), fabs(high)) + (plan->geoid ? GEOID_HIGHEST : 0);
 }
 
 static int set_levels(const store_terrain *t, tile_plan *plan, char **error) {
@@ -108,7 +106,7 @@ static int set_levels(const store_terrain *t, tile_plan *plan, char **error) {
  * at the first level look no further. So eps is halved until there is one. */
 static int keep_ground(tiles *t, char **error) {
     tile_plan *plan = plan_of(t);
-    const double cell = fmax(t->terrain->placement.dx, -t->terrain->placement.dy) * DEGREE * EQUATOR;
+    const double cell = fmax(t->terrain->placement.dx, -t->terrain->placement.dy) * DEGREE * EARTH_A;
     const rqt_placement as_it_is = {0, 0, 1, 1};
     const store_query_options options = plan_options(t, 0);
     rqt_region *all = NULL;

@@ -1,4 +1,4 @@
-/* terrarium_lattice.c - blocks as heights at all vertices of their lattice, and where those lie among the pixels.
+/* lattice.c - blocks as heights at all vertices of their lattice, and where those lie among the pixels.
  *
  * A leaf's plane, at the vertices in it, is what halving its sides again and again gives: so going from coarse to
  * fine, a vertex that is not kept is the middle between the ends of the hypotenuse that it halves. Numbers are
@@ -10,7 +10,7 @@
  * of the two triangles, and what the cells of the lattice make of it is about the mesh, not quite. It does for
  * drawing, where any height will do; the proof looks at the triangles themselves.
  */
-#include "terrarium_leaves.h"
+#include "leaves.h"
 
 #include <math.h>
 

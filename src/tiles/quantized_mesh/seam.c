@@ -11,13 +11,12 @@
  * by a rounding) vertices are moved, and what tiles on both sides state has it. Columns that contradict each other,
  * in voids or by more than levels can bear, are two: no mesh is true to both.
  */
+#include "earth.h"
 #include "quantized_mesh.h"
 
 #include <math.h>
 #include <string.h>
 
-#define DEGREE 0.017453292519943295
-#define EQUATOR 6378137.0
 /* Of a sample's width on the ground. The last level's geometric error is four times that, or more: it has 32
  * samples a side at least. */
 #define MOST_MERGED (1.0 / 32)
@@ -42,7 +41,7 @@ int seam_read(tiles *t, char **error) {
     for (int c = 0; c < 2 && code == SQLITE_OK; c++)
         code = store_window(t->store, terrain, c ? w - 1 : 0, 0, 1, h, plan->seam + c * h, valid + c * h, error);
     if (code == SQLITE_OK) compare_columns(terrain, plan->seam, valid, &plan->merging);
-    if (code != SQLITE_OK || plan->merging > terrain->placement.dx * DEGREE * EQUATOR * MOST_MERGED) {
+    if (code != SQLITE_OK || plan->merging > terrain->placement.dx * DEGREE * EARTH_A * MOST_MERGED) {
         sqlite3_free(plan->seam);
         plan->seam = NULL;
         plan->merging = 0;

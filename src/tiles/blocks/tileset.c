@@ -13,13 +13,11 @@
  * The error of a tile is the mesh's own, for leaves too: 3D Tiles ask there for what is "of or close to 0", and
  * half a quantum of height, and a millimetre of rounding, are what the last level is off.
  */
-#include "block.h"
+#include "blocks.h"
+#include "earth.h"
 
 #include <cjson/cJSON.h>
 #include <math.h>
-
-#define DEGREE 0.017453292519943295
-#define RADIUS 6378137.0
 
 static int finest(const tiles *t) {
     return block_plan_of(t)->finest;
@@ -188,7 +186,7 @@ static int document(tiles *t, const char *root, int first, int last, tile_bytes 
     cJSON_AddStringToObject(asset, "version", "1.1");
     /* What is off without any of it: all that there is. */
     cJSON_AddNumberToObject(tileset, "geometricError",
-                            fmax(off, RADIUS * DEGREE * hypot(e.east - e.west, e.north - e.south)));
+                            fmax(off, EARTH_A * DEGREE * hypot(e.east - e.west, e.north - e.south)));
     add_schema(tileset);
     add_root(t, region, off, tileset);
     add_extras(t, tileset);

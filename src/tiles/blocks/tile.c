@@ -1,4 +1,4 @@
-/* block_tile.c - what is known of a tile without a block being read: whether it is there, what it is off, where it
+/* tile.c - what is known of a tile without a block being read: whether it is there, what it is off, where it
  * lies.
  *
  * Off. All vertices of a closed cell but its corners descend from its centre, so none has an error above the
@@ -18,11 +18,11 @@
  * apart is convex; a wider one counts as the whole turn. Each of these widenings shrinks from a tile to those
  * below it.
  */
-#include "block.h"
+#include "blocks.h"
+#include "earth.h"
 
 #include <math.h>
 
-#define DEGREE 0.017453292519943295
 /* A move of m metres changes a latitude by less than m / this radians, while that is small; else any is possible.
  */
 #define NARROW 4.0e6

@@ -1,17 +1,17 @@
-/* block.h - the parts of the kind 3d-tiles: 3D Tiles 1.1, an implicit quadtree whose tiles are the cells of the
+/* blocks.h - the parts of the kind 3d-tiles: 3D Tiles 1.1, an implicit quadtree whose tiles are the cells of the
  * stored blocks.
  *
- *   block_plan.c    levels and their tolerances, steps of positions
- *   block_tile.c    one tile by the index alone: is it there, what is it off, where does it lie
- *   block_mesh.c    the terrain's mesh of a cell, in space
- *   block_glb.c     the same as glTF
- *   subtree.c       availability and metadata of some levels of tiles
- *   tileset.c       the kind; tileset.json
+ *   plan.c     levels and their tolerances, steps of positions
+ *   tile.c     one tile by the index alone: is it there, what is it off, where does it lie
+ *   mesh.c     the terrain's mesh of a cell, in space
+ *   glb.c      the same as glTF
+ *   subtree.c  availability and metadata of some levels of tiles
+ *   tileset.c  the kind; tileset.json
  */
-#ifndef RQT_TILES_BLOCK_H
-#define RQT_TILES_BLOCK_H
+#ifndef RQT_TILES_BLOCKS_H
+#define RQT_TILES_BLOCKS_H
 
-#include "internal.h"
+#include "kind.h"
 
 enum { SUBTREE_LEVELS = 4 };
 enum { CONTENT, SUBTREES, BLOCK_SERIES };

@@ -1,4 +1,4 @@
-/* block_glb.c - a tile's mesh as glTF 2.0, binary:
+/* glb.c - a tile's mesh as glTF 2.0, binary:
  *
  *   'glTF', u32 2, u32 size;  u32 size, 'JSON', text, blanks to 4 bytes;  u32 size, 'BIN', the buffer, zeros to 4
  *   buffer: positions of all vertices, three floats each; normals, three i8 and a zero; indices, u16 where they fit
@@ -11,9 +11,9 @@
  * unlike viewers of models (format/glb.c). Positions are whole steps from it, as floats exactly. What two tiles
  * share is decoded to the same doubles in both: translation + position is exact.
  *
- * Extras have what the tile is off (block_tile.c), as the subtree does.
+ * Extras have what the tile is off (tile.c), as the subtree does.
  */
-#include "block.h"
+#include "blocks.h"
 #include "format.h"
 
 #include <cjson/cJSON.h>
