@@ -17,6 +17,7 @@ cmp examples/mount-washington.png "$BUILD/demo/mount-washington.png" || exit 1
 echo "so is its picture"
 
 rm -f build/terrain.gpkg build/pyrenees.gpkg build/mesh.gpkg
+rm -rf build/www
 run() { # kind, command that reads it
     local kind=$1
     shift
