@@ -45,20 +45,26 @@ static void clip(const double *lines, const double *pixels, int *first, int *las
     while (*last > *first && lines[*last - 1] > pixels[GRID - 1]) --*last;
 }
 
+static void place_lines(int32_t first, int32_t stride, int32_t most, int line, int last, double *lines) {
+    for (; line <= last; line++) {
+        const int64_t place = first + (int64_t)line * stride;
+        lines[line] = (double)(place < most ? place : most);
+    }
+}
+
 /* The lattice's lines among those of pixels. Triangles that reach beyond the raster may be larger than the box. */
 static void place_lattice(const rqt_block_place *p, lattice *l, lattice_box *box) {
     const pixel_grid *g = l->g;
     const int32_t last_col = g->terrain->lattice.width - 1, last_row = g->terrain->lattice.height - 1;
     const int last = l->n - 1;
-    for (int n = 0; n <= last; n++) {
-        const int64_t by = (int64_t)n * p->stride, col = p->x + by, row = p->y + by;
-        l->col[n] = (double)(col < last_col ? col : last_col);
-        l->row[n] = (double)(row < last_row ? row : last_row);
-    }
+    lattice_box placed = *box;
+    l->is_squeezed = p->side > last_col - p->x || p->side > last_row - p->y;
+    if (l->is_squeezed) placed = (lattice_box){0, last, 0, last};
+    place_lines(p->x, p->stride, last_col, placed.west, placed.east, l->col);
+    place_lines(p->y, p->stride, last_row, placed.north, placed.south, l->row);
     clip(l->col, g->col, &box->west, &box->east);
     clip(l->row, g->row, &box->north, &box->south);
-    l->is_squeezed = p->side > last_col - p->x || p->side > last_row - p->y;
-    const lattice_box placed = l->is_squeezed ? (lattice_box){0, last, 0, last} : *box;
+    if (!l->is_squeezed) placed = *box;
     find_cells(l->col, placed.west, placed.east, g->col, l->first_col, l->cell_col);
     find_cells(l->row, placed.north, placed.south, g->row, l->first_row, l->cell_row);
     for (int n = box->west; n <= box->east; n++) {
@@ -78,7 +84,7 @@ static void find_pixels(const double *lines, int line, int last, const double *p
     for (int i = first; i <= end; i++) {
         while (line + 1 < last && lines[line + 1] < pixels[i] && lines[line + 2] > lines[line + 1]) line++;
         at[i] = line;
-        f[i] = fmin(fmax((pixels[i] - lines[line]) / (lines[line + 1] - lines[line]), 0), 1);
+        f[i] = smaller(larger((pixels[i] - lines[line]) / (lines[line + 1] - lines[line]), 0), 1);
     }
 }
 
@@ -193,6 +199,7 @@ int lattice_read(tiles *t, const rqt_block_place *place, rqt_block_number number
     if (code != SQLITE_OK) return code;
     const bool is_main = (place->i + place->j) % 2 == 0, has_all = place->stride == 1;
     l->n = (1 << t->terrain->k) + 1;
+    l->stride = place->stride;
     l->turned = l->n == 2 && !is_main;
     l->floor = has_all ? 0 : rqt_code_metres(l->block->floor);
     place_lattice(place, l, box);

@@ -22,15 +22,15 @@ bool triangle_span(const corner triangle[3], double from, double to, double *wes
     for (int a = 0; a < 3; a++) {
         const corner *p = &triangle[a], *q = &triangle[a == 2 ? 0 : a + 1];
         if (p->row >= from && p->row <= to) {
-            *west = fmin(*west, p->col);
-            *east = fmax(*east, p->col);
+            *west = smaller(*west, p->col);
+            *east = larger(*east, p->col);
         }
         for (int b = 0; b < 2; b++) {
             const double row = b ? to : from;
             if ((p->row < row) == (q->row < row)) continue;
             const double col = p->col + (q->col - p->col) * ((row - p->row) / (q->row - p->row));
-            *west = fmin(*west, col);
-            *east = fmax(*east, col);
+            *west = smaller(*west, col);
+            *east = larger(*east, col);
         }
     }
     return *west <= *east;
@@ -111,10 +111,10 @@ static int visit_turn(tiles *t, int level, pixel_grid *g, int turn, visit_block 
                       char **error) {
     const rqt_lattice *all = &t->terrain->lattice;
     const double side = ldexp(1, all->K - level);
-    const int32_t i0 = (int32_t)floor(fmax(g->col[0] - 1, 0) / side),
-                  j0 = (int32_t)floor(fmax(g->row[0] - 1, 0) / side);
-    const int32_t i1 = (int32_t)floor(fmin(g->col[GRID - 1] + 1, all->width - 1) / side),
-                  j1 = (int32_t)floor(fmin(g->row[GRID - 1] + 1, all->height - 1) / side);
+    const int32_t i0 = (int32_t)floor(larger(g->col[0] - 1, 0) / side),
+                  j0 = (int32_t)floor(larger(g->row[0] - 1, 0) / side);
+    const int32_t i1 = (int32_t)floor(smaller(g->col[GRID - 1] + 1, all->width - 1) / side),
+                  j1 = (int32_t)floor(smaller(g->row[GRID - 1] + 1, all->height - 1) / side);
     for (int32_t j = j0; j <= j1; j++)
         for (int32_t i = i0; i <= i1; i++) {
             const rqt_block_number number = rqt_block_number_of(level, i, j);

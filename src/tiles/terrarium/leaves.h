@@ -18,6 +18,7 @@ typedef struct lattice {
     pixel_grid *g;
     const rqt_block *block; /* until another one is read */
     int n;                  /* vertices a side */
+    double stride;          /* samples from one to the next, where it is not squeezed */
     int turned;             /* 1: the diagonals are the other way around, as in a block of one cell */
     bool is_squeezed;       /* reaches beyond the raster */
     bool has_voids;         /* in the box */

@@ -58,6 +58,14 @@ static inline double pixels_between(const pixel_grid *g, size_t at, double u, do
     return above + v * (below - above);
 }
 
+/* As fmax and fmin, which are calls. */
+static inline double larger(double a, double b) {
+    return a > b ? a : b;
+}
+static inline double smaller(double a, double b) {
+    return a < b ? a : b;
+}
+
 /* Codes, and the error. */
 int samples_draw(tiles *t, pixel_grid *g, char **error);
 int leaves_draw(tiles *t, int shift, pixel_grid *g, char **error);
