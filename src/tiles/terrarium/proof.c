@@ -130,19 +130,19 @@ static double measure_straddling(const lattice *l, const rqt_block_place *place,
     if (lattice_misses(l, triangle) || !lattice_straddles(l, place, triangle)) return -1;
     if (lattice_split(l, triangle, children))
         return larger(measure_straddling(l, place, box, children[0], has_holes),
-                    measure_straddling(l, place, box, children[1], has_holes));
+                      measure_straddling(l, place, box, children[1], has_holes));
     if (triangle[0].valid && triangle[1].valid && triangle[2].valid) return measure_triangle(l, triangle);
     *has_holes = true;
     return -1;
 }
 
-/* Has half a cell a height though the other has none? Then the most along the diagonal. (The rest of its border, and
- * the pixels in it, are looked at with all others.) */
+/* Has half a cell a height though the other has none? Then the most along the diagonal. (The rest of its border,
+ * and the pixels in it, are looked at with all others.) */
 static double measure_diagonal(const lattice *l, int x, int y) {
     const bool is_main = (x + y + l->turned) % 2 == 0;
     const corner a = lattice_corner(l, is_main ? x : x + 1, y), b = lattice_corner(l, is_main ? x + 1 : x, y + 1);
-    const bool has_half = lattice_corner(l, is_main ? x + 1 : x, y).valid ||
-                          lattice_corner(l, is_main ? x : x + 1, y + 1).valid;
+    const bool has_half =
+        lattice_corner(l, is_main ? x + 1 : x, y).valid || lattice_corner(l, is_main ? x : x + 1, y + 1).valid;
     return a.valid && b.valid && has_half ? measure_side(l, &a, &b) : -1;
 }
 
@@ -175,7 +175,7 @@ static bool is_drawn(const lattice *l, int x, int y) {
     return false;
 }
 
-/* A quarter of what a cell of pixels in the window is bent by, at most, over the sides of the lattice's cells. */
+/* Cells of the lattice that are small in those of pixels: how far F - B' is from its chord along a diagonal. */
 static double find_bulge(const lattice *l, const lattice_box *box) {
     const pixel_grid *g = l->g;
     const int west = l->first_col[box->west], north = l->first_row[box->north];
@@ -192,7 +192,8 @@ static double find_bulge(const lattice *l, const lattice_box *box) {
 /* Margins of the cells that have heights at all corners. Of others: the most along diagonals; and whether samples
  * may be there that are between pixels, but in leaves without a height. */
 static double measure_cells(const lattice *l, const lattice_box *box, margins *m, bool *has_holes) {
-    const double bulge = find_bulge(l, box), *h = l->metres;
+    const bool are_small = l->stride * l->g->per_col <= 0.5;
+    const double bulge = are_small ? find_bulge(l, box) : 0, *h = l->metres;
     const uint8_t *what = l->what;
     double most = -1;
     *m = (margins){.most = 0};
@@ -200,7 +201,7 @@ static double measure_cells(const lattice *l, const lattice_box *box, margins *m
     for (int y = box->north; y < box->south; y++) {
         const bool is_flat = l->row[y + 1] == l->row[y] || l->first_row[y + 1] == 0 || l->first_row[y] == GRID;
         if (is_flat) continue;
-        const bool is_crossed = l->first_row[y] != l->first_row[y + 1];
+        const bool is_crossed = !are_small || l->first_row[y] != l->first_row[y + 1];
         double *margin = m->at[y - box->north + 1] + 1;
         for (int x = box->west; x < box->east; x++, margin++) {
             const size_t nw = (size_t)y * (size_t)l->n + (size_t)x, sw = nw + (size_t)l->n;
