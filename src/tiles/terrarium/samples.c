@@ -33,8 +33,11 @@ static int read_window(tiles *t, const pixel_grid *g, window *w, char **error) {
     w->valid = sqlite3_malloc64(count);
     if (!w->metres || !w->q || !w->valid) return SQLITE_NOMEM;
     const int code = store_window(t->store, t->terrain, w->col, w->row, w->width, w->height, w->q, w->valid, error);
-    for (size_t i = 0; i < count && code == SQLITE_OK; i++)
-        w->metres[i] = w->valid[i] ? rqt_unit_metres(&t->terrain->unit, w->q[i]) : 0;
+    if (code != SQLITE_OK) return code;
+    /* rqt_unit_metres, of many at once. */
+    const rqt_unit *unit = &t->terrain->unit;
+    const double z0 = (double)unit->z0, d = (double)unit->d, factor = rqt_unit_factor(unit), offset = unit->offset;
+    for (size_t i = 0; i < count; i++) w->metres[i] = (z0 + w->q[i] / d) * factor + offset;
     return code;
 }
 
