@@ -172,25 +172,26 @@ static void fill(lattice *l, const lattice_box *box, bool has_all, bool is_main)
     const rqt_unit *unit = &l->g->terrain->unit;
     const rqt_block *block = l->block;
     const size_t n = (size_t)l->n, corners[4] = {0, n - 1, n * n - n, n * n - 1};
-    uint8_t valid = RQT_VALID;
+    uint8_t what = HAS_HEIGHT;
     l->scale = rqt_unit_factor(unit) / unit->d;
     l->zero = rqt_unit_metres(unit, 0);
     for (int i = 0; i < 4; i++) {
         l->metres[corners[i]] = block->q[corners[i]] * l->scale + l->zero;
         l->what[corners[i]] = IS_SAMPLE | (block->flags[corners[i]] & RQT_VALID ? HAS_HEIGHT : 0);
-        valid &= block->flags[corners[i]];
+        what &= l->what[corners[i]];
     }
     if (!has_all)
         for (int half = (l->n - 1) / 2; half > 0; half /= 2) fill_squares(l, box, half, is_main);
     for (int y = box->north; y <= box->south; y++)
         for (int x = box->west; x <= box->east; x++) {
             const size_t at = (size_t)y * n + (size_t)x;
-            valid &= block->flags[at];
-            if (!has_all) continue;
-            l->metres[at] = block->q[at] * l->scale + l->zero;
-            l->what[at] = IS_SAMPLE | (block->flags[at] & RQT_VALID ? HAS_HEIGHT : 0);
+            if (has_all) {
+                l->metres[at] = block->q[at] * l->scale + l->zero;
+                l->what[at] = IS_SAMPLE | (block->flags[at] & RQT_VALID ? HAS_HEIGHT : 0);
+            }
+            what &= l->what[at];
         }
-    l->has_voids = !valid;
+    l->has_voids = !what;
 }
 
 int lattice_read(tiles *t, const rqt_block_place *place, rqt_block_number number, lattice *l, lattice_box *box,

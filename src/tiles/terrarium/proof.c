@@ -32,6 +32,7 @@
 
 #include <limits.h>
 #include <math.h>
+#include <string.h>
 
 #define ROUNDED 1e-4 /* metres: what doubles and SLACK are */
 #define TIGHT 1.25
@@ -155,16 +156,11 @@ static bool is_beside(const pixel_grid *g, size_t at, double u, double v) {
            (is_left && is_up && at > GRID && g->is_whole[at - GRID - 1]);
 }
 
-/* What F may be further from B' than Q is, for each cell of a box; and around them 0. */
+/* What F may be further from B' than Q is, for each row of cells of a box, and 0 around: row y has y - north + 1.
+ */
 typedef struct margins {
-    double at[BOX + 2][BOX + 2]; /* of cell x, y: at[y - north + 1][x - west + 1] */
-    double most;
+    double of[BOX + 2];
 } margins;
-
-/* Where the box begins. */
-static double margin_of_vertex(const margins *m, int x, int y) {
-    return larger(larger(m->at[y][x], m->at[y][x + 1]), larger(m->at[y + 1][x], m->at[y + 1][x + 1]));
-}
 
 /* Does a cell of the lattice meet one of pixels that is whole? */
 static bool is_drawn(const lattice *l, int x, int y) {
@@ -196,19 +192,18 @@ static double measure_cells(const lattice *l, const lattice_box *box, margins *m
     const double bulge = are_small ? find_bulge(l, box) : 0, *h = l->metres;
     const uint8_t *what = l->what;
     double most = -1;
-    *m = (margins){.most = 0};
+    *m = (margins){{0}};
     *has_holes = false;
     for (int y = box->north; y < box->south; y++) {
         const bool is_flat = l->row[y + 1] == l->row[y] || l->first_row[y + 1] == 0 || l->first_row[y] == GRID;
         if (is_flat) continue;
         const bool is_crossed = !are_small || l->first_row[y] != l->first_row[y + 1];
-        double *margin = m->at[y - box->north + 1] + 1;
-        for (int x = box->west; x < box->east; x++, margin++) {
+        double *margin = &m->of[y - box->north + 1];
+        for (int x = box->west; x < box->east; x++) {
             const size_t nw = (size_t)y * (size_t)l->n + (size_t)x, sw = nw + (size_t)l->n;
             if (what[nw] & what[nw + 1] & what[sw] & what[sw + 1] & HAS_HEIGHT) {
                 const bool is_inside = !is_crossed && l->first_col[x] == l->first_col[x + 1];
-                *margin = is_inside ? bulge : fabs(h[nw] - h[nw + 1] - h[sw] + h[sw + 1]) / 4;
-                m->most = larger(m->most, *margin);
+                *margin = larger(*margin, is_inside ? bulge : fabs(h[nw] - h[nw + 1] - h[sw] + h[sw + 1]) / 4);
             } else if (l->col[x + 1] > l->col[x] && is_drawn(l, x, y)) {
                 *has_holes = true;
                 most = larger(most, measure_diagonal(l, x, y));
@@ -216,6 +211,10 @@ static double measure_cells(const lattice *l, const lattice_box *box, margins *m
         }
     }
     return most;
+}
+
+static double with_margin(double most, double margin) {
+    return most < 0 ? most : most + margin;
 }
 
 /* Vertices: with their margins, and what those that are samples are off. */
@@ -226,15 +225,16 @@ static double see(const lattice *l, const lattice_box *box, const lattice_window
     for (int y = w->lines.north; y <= w->lines.south; y++) {
         const size_t row = (size_t)l->cell_row[y] * GRID, first = (size_t)y * (size_t)l->n;
         const double v = l->v[y];
+        double here = -1;
         for (int x = w->lines.west; x <= w->lines.east; x++) {
             const size_t at = row + (size_t)l->cell_col[x], vertex = first + (size_t)x;
             if (!(l->what[vertex] & HAS_HEIGHT)) continue;
             if (!g->is_whole[at] && !is_beside(g, at, l->u[x], v)) continue;
             const double off = fabs(pixels_between(g, at, l->u[x], v) - l->metres[vertex]);
             if (off > most_samples && (l->what[vertex] & IS_SAMPLE)) most_samples = off;
-            if (off + m->most <= most) continue;
-            most = larger(most, off + margin_of_vertex(m, x - box->west, y - box->north));
+            here = larger(here, off);
         }
+        most = larger(most, with_margin(here, larger(m->of[y - box->north], m->of[y - box->north + 1])));
     }
     *seen = most_samples;
     return most;
@@ -248,6 +248,7 @@ static double measure_rows(const lattice *l, const lattice_box *box, const latti
         const size_t row = (size_t)l->cell_row[y] * GRID;
         const double *h = l->metres + (size_t)y * (size_t)l->n, v = l->v[y];
         const uint8_t *what = l->what + (size_t)y * (size_t)l->n;
+        double here = -1;
         for (int i = w->pixels.west; i <= w->pixels.east; i++) {
             const int x = l->at_col[i];
             const size_t at = row + (size_t)i;
@@ -255,10 +256,9 @@ static double measure_rows(const lattice *l, const lattice_box *box, const latti
             if (!g->is_whole[at] && !(i > 0 && g->is_whole[at - 1])) continue;
             const double drawn = g->height[at] + v * (g->height[at + GRID] - g->height[at]);
             const double off = fabs(h[x] + l->fx[i] * (h[x + 1] - h[x]) - drawn);
-            if (off + m->most <= most) continue;
-            const double *above = &m->at[y - box->north][x - box->west + 1];
-            most = larger(most, off + larger(above[0], above[BOX + 2]));
+            here = larger(here, off);
         }
+        most = larger(most, with_margin(here, larger(m->of[y - box->north], m->of[y - box->north + 1])));
     }
     return most;
 }
@@ -271,16 +271,16 @@ static double measure_cols(const lattice *l, const lattice_box *box, const latti
         const int y = l->at_row[j];
         const size_t up = (size_t)y * (size_t)l->n, down = up + (size_t)l->n, row = (size_t)j * GRID;
         const double *h = l->metres, fy = l->fy[j];
+        double here = -1;
         for (int x = w->lines.west; x <= w->lines.east; x++) {
             const size_t at = row + (size_t)l->cell_col[x], a = up + (size_t)x, b = down + (size_t)x;
             if (!(l->what[a] & l->what[b] & HAS_HEIGHT)) continue;
             if (!g->is_whole[at] && !(j > 0 && g->is_whole[at - GRID])) continue;
             const double drawn = g->height[at] + l->u[x] * (g->height[at + 1] - g->height[at]);
             const double off = fabs(h[a] + fy * (h[b] - h[a]) - drawn);
-            if (off + m->most <= most) continue;
-            const double *left = &m->at[y - box->north + 1][x - box->west];
-            most = larger(most, off + larger(left[0], left[1]));
+            here = larger(here, off);
         }
+        most = larger(most, with_margin(here, m->of[y - box->north + 1]));
     }
     return most;
 }
@@ -290,16 +290,102 @@ static double measure_pixels(const lattice *l, const lattice_box *box, const lat
     double most = -1;
     for (int j = w->pixels.north; j <= w->pixels.south; j++) {
         const int y = l->at_row[j];
+        double here = -1;
         for (int i = w->pixels.west; i <= w->pixels.east; i++) {
             const size_t at = (size_t)j * GRID + (size_t)i;
-            const int x = l->at_col[i];
             double metres;
             if (g->code[at] == NO_HEIGHT || !is_needed(g, i, j)) continue;
-            if (!lattice_height(l, x, y, l->fx[i], l->fy[j], &metres)) continue;
-            most = larger(most, fabs(metres - g->height[at]) + m->at[y - box->north + 1][x - box->west + 1]);
+            if (!lattice_height(l, l->at_col[i], y, l->fx[i], l->fy[j], &metres)) continue;
+            here = larger(here, fabs(metres - g->height[at]));
         }
+        most = larger(most, with_margin(here, m->of[y - box->north + 1]));
     }
     return most;
+}
+
+/* The same four of a whole box that has heights everywhere, between pixels of terrain: rows of vertices, with
+ * columns of pixels in them, and rows of pixels, with columns of the lattice in them, from north to south. */
+enum { ACROSS = BOX + 1 };
+typedef struct strip_rows {
+    int row[2];              /* of pixels: an even and an odd one that are known */
+    double drawn[2][ACROSS]; /* at the lattice's columns */
+    double height[2][GRID];  /* of an even and an odd row of the lattice at the columns of pixels */
+} strip_rows;
+
+static const double *draw_row(const lattice *l, int west, int j, strip_rows *s) {
+    double *drawn = s->drawn[j % 2];
+    if (s->row[j % 2] == j) return drawn;
+    s->row[j % 2] = j;
+    for (int x = 0; x < ACROSS; x++) {
+        const double *h = l->g->height + (size_t)j * GRID + l->cell_col[west + x];
+        drawn[x] = h[0] + l->u[west + x] * (h[1] - h[0]);
+    }
+    return drawn;
+}
+
+/* Of the rows a and b, with `share` of b, and one between them. */
+static double compare(const double *a, const double *b, double share, const double *other, int n, double most) {
+    for (int i = 0; i < n; i++) most = larger(most, fabs(a[i] + share * (b[i] - a[i]) - other[i]));
+    return most;
+}
+
+/* Heights of the lattice's row where columns of pixels cross it. */
+static double *cross_row(const lattice *l, const lattice_window *w, int y, strip_rows *s) {
+    double *height = s->height[y % 2];
+    const double *h = l->metres + (size_t)y * (size_t)l->n;
+    for (int i = w->pixels.west; i <= w->pixels.east; i++) {
+        const int x = l->at_col[i];
+        height[i] = h[x] + l->fx[i] * (h[x + 1] - h[x]);
+    }
+    return height + w->pixels.west;
+}
+
+static double measure_row(const lattice *l, const lattice_box *box, const lattice_window *w, int y,
+                          const double *height, strip_rows *s, double *seen) {
+    const int j = l->cell_row[y];
+    const size_t begin = (size_t)y * (size_t)l->n + (size_t)box->west;
+    const double *vertices = l->metres + begin, *pixels = l->g->height + (size_t)j * GRID + w->pixels.west;
+    const double *above = draw_row(l, box->west, j, s), *below = draw_row(l, box->west, j + 1, s), v = l->v[y];
+    const double most = compare(above, below, v, vertices, ACROSS, 0);
+    for (int x = 0; x < ACROSS && most > *seen; x++)
+        if (l->what[begin + (size_t)x] & IS_SAMPLE)
+            *seen = larger(*seen, fabs(above[x] + v * (below[x] - above[x]) - vertices[x]));
+    return compare(pixels, pixels + GRID, v, height, w->pixels.east - w->pixels.west + 1, most);
+}
+
+static double measure_whole(const lattice *l, const lattice_box *box, const lattice_window *w, const margins *m,
+                            double *seen) {
+    const int count = w->pixels.east - w->pixels.west + 1;
+    const double *up = NULL;
+    strip_rows s = {.row = {-1, -1}};
+    double most = 0;
+    int j = w->pixels.north;
+    while (j <= w->pixels.south && l->at_row[j] < box->north) j++; /* on the first row of vertices */
+    for (int y = box->north; y <= box->south; y++) {
+        const double *margin = &m->of[y - box->north], *down = cross_row(l, w, y, &s);
+        for (; j <= w->pixels.south && l->at_row[j] < y; j++) {
+            const double *vertices = l->metres + (size_t)(y - 1) * (size_t)l->n + box->west, fy = l->fy[j];
+            const double *pixels = l->g->height + (size_t)j * GRID + w->pixels.west;
+            double here = compare(vertices, vertices + l->n, fy, draw_row(l, box->west, j, &s), ACROSS, 0);
+            here = compare(up, down, fy, pixels, count, here);
+            most = larger(most, here + margin[0]);
+        }
+        most = larger(most, measure_row(l, box, w, y, down, &s, seen) + larger(margin[0], margin[1]));
+        up = down;
+    }
+    return most;
+}
+
+/* Has a box, whole, heights everywhere, and lies between pixels of terrain? */
+static bool is_whole(const lattice *l, const lattice_box *box) {
+    const int west = l->cell_col[box->west], east = l->cell_col[box->east];
+    const int north = l->cell_row[box->north], south = l->cell_row[box->south];
+    if (l->has_voids || l->is_squeezed || box->east - box->west != BOX || box->south - box->north != BOX)
+        return false;
+    if (west < 0 || east < 0 || north < 0 || south < 0) return false;
+    for (int j = north; j <= south; j++)
+        if (memchr(l->g->is_whole + (size_t)j * GRID + west, false, (size_t)(east - west) + 1)) return false;
+    return true;
 }
 
 /* sup |F - B'|; and what samples at vertices are off. */
@@ -307,10 +393,11 @@ static double measure(const lattice *l, const rqt_block_place *place, const latt
                       bool *has_holes) {
     const lattice_window w = lattice_window_of(l, box);
     corner halves[2][3];
-    margins m = {.most = 0};
+    margins m = {{0}};
     *has_holes = false;
     if (place->stride == 1) return see(l, box, &w, &m, seen);
     double most = measure_cells(l, box, &m, has_holes);
+    if (is_whole(l, box)) return larger(most, measure_whole(l, box, &w, &m, seen));
     most = larger(most, see(l, box, &w, &m, seen));
     most = larger(most, measure_rows(l, box, &w, &m));
     most = larger(most, measure_cols(l, box, &w, &m));
