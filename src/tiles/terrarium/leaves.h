@@ -22,7 +22,6 @@ typedef struct lattice {
     int turned;             /* 1: the diagonals are the other way around, as in a block of one cell */
     bool is_squeezed;       /* reaches beyond the raster */
     bool has_voids;         /* at vertices in the box, or at corners */
-    double scale, zero;     /* metres of a block's height, and of 0 */
     double floor;           /* metres: samples in leaves with three corners are no further off */
     double col[MOST_SIDE], row[MOST_SIDE];          /* of its columns and rows, in samples */
     int first_col[MOST_SIDE], first_row[MOST_SIDE]; /* the pixels that are at them or next beyond */

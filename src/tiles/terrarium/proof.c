@@ -201,7 +201,7 @@ static double measure_cells(const lattice *l, const lattice_box *box, margins *m
         double *margin = &m->of[y - box->north + 1];
         for (int x = box->west; x < box->east; x++) {
             const size_t nw = (size_t)y * (size_t)l->n + (size_t)x, sw = nw + (size_t)l->n;
-            if (what[nw] & what[nw + 1] & what[sw] & what[sw + 1] & HAS_HEIGHT) {
+            if (!l->has_voids || what[nw] & what[nw + 1] & what[sw] & what[sw + 1] & HAS_HEIGHT) {
                 const bool is_inside = !is_crossed && l->first_col[x] == l->first_col[x + 1];
                 *margin = larger(*margin, is_inside ? bulge : fabs(h[nw] - h[nw + 1] - h[sw] + h[sw + 1]) / 4);
             } else if (l->col[x + 1] > l->col[x] && is_drawn(l, x, y)) {
