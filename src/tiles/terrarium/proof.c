@@ -137,6 +137,24 @@ static double measure_straddling(const lattice *l, const rqt_block_place *place,
     return -1;
 }
 
+/* Is there such a leaf in a box, or one like it without a height? Few boxes have one. */
+static bool has_straddling(const lattice *l, const rqt_block_place *place, const lattice_box *box,
+                           const corner triangle[3]) {
+    const lattice_box b = lattice_box_of(triangle);
+    corner children[2][3];
+    if (b.west >= box->east || b.east <= box->west || b.north >= box->south || b.south <= box->north) return false;
+    if (lattice_misses(l, triangle) || !lattice_straddles(l, place, triangle)) return false;
+    return !lattice_split(l, triangle, children) || has_straddling(l, place, box, children[0]) ||
+           has_straddling(l, place, box, children[1]);
+}
+
+static bool is_straddled(const lattice *l, const rqt_block_place *place, const lattice_box *box) {
+    corner halves[2][3];
+    if (!l->is_squeezed) return false;
+    lattice_halves(l, place, halves);
+    return has_straddling(l, place, box, halves[0]) || has_straddling(l, place, box, halves[1]);
+}
+
 /* Has half a cell a height though the other has none? Then the most along the diagonal. (The rest of its border,
  * and the pixels in it, are looked at with all others.) */
 static double measure_diagonal(const lattice *l, int x, int y) {
@@ -380,8 +398,9 @@ static double measure_whole(const lattice *l, const lattice_box *box, const latt
 static bool is_whole(const lattice *l, const lattice_box *box) {
     const int west = l->cell_col[box->west], east = l->cell_col[box->east];
     const int north = l->cell_row[box->north], south = l->cell_row[box->south];
-    if (l->has_voids || l->is_squeezed || box->east - box->west != BOX || box->south - box->north != BOX)
+    if (l->has_voids || l->col[box->east] == l->col[box->east - 1] || l->row[box->south] == l->row[box->south - 1])
         return false;
+    if (box->east - box->west != BOX || box->south - box->north != BOX) return false;
     if (west < 0 || east < 0 || north < 0 || south < 0) return false;
     for (int j = north; j <= south; j++)
         if (memchr(l->g->is_whole + (size_t)j * GRID + west, false, (size_t)(east - west) + 1)) return false;
@@ -389,20 +408,21 @@ static bool is_whole(const lattice *l, const lattice_box *box) {
 }
 
 /* sup |F - B'|; and what samples at vertices are off. */
-static double measure(const lattice *l, const rqt_block_place *place, const lattice_box *box, double *seen,
-                      bool *has_holes) {
+static double measure(const lattice *l, const rqt_block_place *place, const lattice_box *box, bool may_straddle,
+                      double *seen, bool *has_holes) {
     const lattice_window w = lattice_window_of(l, box);
     corner halves[2][3];
     margins m = {{0}};
     *has_holes = false;
     if (place->stride == 1) return see(l, box, &w, &m, seen);
     double most = measure_cells(l, box, &m, has_holes);
-    if (is_whole(l, box)) return larger(most, measure_whole(l, box, &w, &m, seen));
+    const bool straddles = may_straddle && is_straddled(l, place, box);
+    if (!straddles && is_whole(l, box)) return larger(most, measure_whole(l, box, &w, &m, seen));
     most = larger(most, see(l, box, &w, &m, seen));
     most = larger(most, measure_rows(l, box, &w, &m));
     most = larger(most, measure_cols(l, box, &w, &m));
     most = larger(most, measure_pixels(l, box, &w, &m));
-    if (!l->is_squeezed) return most;
+    if (!straddles) return most;
     lattice_halves(l, place, halves);
     for (int i = 0; i < 2; i++) most = larger(most, measure_straddling(l, place, box, halves[i], has_holes));
     return most;
@@ -444,9 +464,10 @@ static int box_side(const lattice *l) {
 }
 
 /* A box of the block at hand. If it is of stride 1, all of its samples are seen and it is done with. */
-static int add(const rqt_block_place *place, part here, const lattice_box *box, double inherited, proof *p) {
+static int add(const rqt_block_place *place, part here, const lattice_box *box, bool may_straddle, double inherited,
+               proof *p) {
     bool has_holes;
-    const double off = measure(&p->l, place, box, &p->seen, &has_holes);
+    const double off = measure(&p->l, place, box, may_straddle, &p->seen, &has_holes);
     if (place->stride == 1) return SQLITE_OK;
     here.bound = off < 0 ? -1 : off + p->l.floor;
     if (has_holes && inherited > here.bound) here.bound = inherited;
@@ -459,11 +480,13 @@ static int add_all(tiles *t, const rqt_block_place *place, rqt_block_number numb
     int code = lattice_read(t, place, number, &p->l, &all, error);
     if (code != SQLITE_OK) return code;
     const int side = box_side(&p->l);
+    const bool may_straddle = place->stride > 1 && is_straddled(&p->l, place, &all);
     for (int y = all.north / side * side; y < all.south && code == SQLITE_OK; y += side)
         for (int x = all.west / side * side; x < all.east && code == SQLITE_OK; x += side) {
             const lattice_box box = {x < all.west ? all.west : x, x + side > all.east ? all.east : x + side,
                                      y < all.north ? all.north : y, y + side > all.south ? all.south : y + side};
-            code = add(place, (part){.number = number, .turn = turn, .x = x, .y = y}, &box, inherited, p);
+            code = add(place, (part){.number = number, .turn = turn, .x = x, .y = y}, &box, may_straddle, inherited,
+                       p);
         }
     return code;
 }
