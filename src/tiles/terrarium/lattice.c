@@ -242,7 +242,6 @@ static void fill(lattice *l, const lattice_box *box, bool has_all, bool is_main)
     for (int i = 0; i < 4; i++) {
         const lattice_box here = {i % 2 * last, i % 2 * last, i / 2 * last, i / 2 * last};
         fill_samples(&f, &here);
-        what &= l->what[(size_t)here.north * f.n + (size_t)here.west];
     }
     if (has_all)
         fill_samples(&f, box);

@@ -262,7 +262,7 @@ static int draw_block(tiles *t, const rqt_block_place *place, rqt_block_number n
     const int code = lattice_read(t, place, number, l, &box, error);
     if (code != SQLITE_OK) return code;
     draw_pixels(l, &box);
-    if (!l->has_voids) return SQLITE_OK;
+    if (!l->has_voids && !l->is_squeezed) return SQLITE_OK;
     lattice_halves(l, place, halves);
     void_leaves(l, place, &box, halves[0]);
     void_leaves(l, place, &box, halves[1]);

@@ -21,7 +21,7 @@ typedef struct lattice {
     double stride;          /* samples from one to the next, where it is not squeezed */
     int turned;             /* 1: the diagonals are the other way around, as in a block of one cell */
     bool is_squeezed;       /* reaches beyond the raster */
-    bool has_voids;         /* at vertices in the box, or at corners */
+    bool has_voids;         /* at vertices in the box */
     double floor;           /* metres: samples in leaves with three corners are no further off */
     double col[MOST_SIDE], row[MOST_SIDE];          /* of its columns and rows, in samples */
     int first_col[MOST_SIDE], first_row[MOST_SIDE]; /* the pixels that are at them or next beyond */
