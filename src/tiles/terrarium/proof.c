@@ -10,10 +10,12 @@
  * which, times what the two rows differ by, is `bent`.
  *
  * F in place of the mesh of two triangles is in each cell of the lattice its bilinear Q, from which they are at
- * most |nw - ne - sw + se| / 4 (`twist`). Q - B' is bilinear wherever a cell of the lattice and a cell of pixels
- * have something in common, a rectangle, and so has its extremes at that one's corners: vertices, pixels, and where
- * lines of the lattice cross lines of pixels. These are few loops over arrays. Half cells whose other half has no
- * height, and leaves that reach beyond the raster, are no such cells: they are looked at as triangles. There plane
+ * most |nw - ne - sw + se| / 4 (a row's `margins`). Q - B' is bilinear wherever a cell of the lattice and a cell of
+ * pixels have something in common, a rectangle, and so has its extremes at that one's corners: vertices, pixels,
+ * and where lines of the lattice cross lines of pixels. These are few loops over arrays. A cell of the lattice that
+ * lies in one of pixels needs no Q: F - B' is linear on its sides, and on its diagonal a parabola (see below),
+ * whose bulge is the less the smaller the cell. Half cells whose other half has no height, and leaves that reach
+ * beyond the raster, are no such cells: they are looked at as triangles. There plane
  * - B' has no extremes inside a cell of pixels either, being a saddle; on sides that slant it is a parabola, at
  * most |k du dv| / 4 from the chord. So it is enough to walk along the sides from line to line, and to look at the
  * pixels inside.
