@@ -23,12 +23,9 @@ if ! cmp -s tests/web/deckgl.sha512 "$packages/deckgl/installed.sha512"; then
     mkdir "$packages/deckgl"
     cp tests/web/deckgl.sha512 tests/web/.npmrc "$packages/deckgl/"
     (
-        cd "$packages/deckgl"
-        npm pack deck.gl@9.4.0 @loaders.gl/terrain@4.4.3 && sha512sum -c deckgl.sha512
-        for archive in *.tgz; do
-            mkdir "${archive%-*}"
-            tar -xzf "$archive" -C "${archive%-*}" --strip-components=1
-        done
+        unpack() { mkdir "$1" && tar -xzf "$1"-*.tgz -C "$1" --strip-components=1; }
+        cd "$packages/deckgl" && npm pack deck.gl@9.4.0 @loaders.gl/terrain@4.4.3 && sha512sum -c deckgl.sha512 &&
+            unpack deck.gl && unpack loaders.gl-terrain
     ) >"$packages/npm.log" 2>&1 || fail deck.gl
     mv "$packages/deckgl/deckgl.sha512" "$packages/deckgl/installed.sha512"
 fi
