@@ -24,36 +24,36 @@ const PAGE = `<!doctype html><meta charset="utf-8"><title>terrain</title><link r
 const VOID = -32768, PIXELS = 256, STEP = 1 / 1200, RADIANS = Math.PI / 180;
 // Cells of 15/16 of a power of two: the first subtree is full, and the tiles below it are not.
 const SIDE = 471;
-/** Parts of degree squares. x0, y0: the first sample. */
-const TERRAINS = {
-    peak: {source: join(ROOT, 'examples', 'N44W072.hgt.zip'), column: 600, row: 640, x0: -72 + 600 * STEP, y0: 45 - 640 * STEP},
-    holes: {source: join(ROOT, 'tests', 'data', 'N41E001.hgt.zip'), column: 700, row: 180, x0: 1 + 700 * STEP, y0: 42 - 180 * STEP},
-};
+// A part of a degree square: Montserrat, with voids at its cliffs.
+const SOURCE = join(ROOT, 'tests', 'data', 'N41E001.hgt.zip'), COLUMN = 700, ROW = 180, X0 = 1 + COLUMN * STEP, Y0 = 42 - ROW * STEP;
+const VIEW = {longitude: 1.83, latitude: 41.57, zoom: 12.4, pitch: 60, bearing: -10};
 
 /* What people would write: README has the same. */
-async function terrainLayer({deck, url}) {
+async function terrainLayer({deck: {TerrainLayer}, url}) {
     const {tiles, bounds, minzoom, maxzoom} = await (await fetch(`${url}/terrarium/tile.json`)).json();
-    return new deck.TerrainLayer({
+    return {layers: [new TerrainLayer({
         id: 'ground', elevationData: tiles, extent: bounds, minZoom: minzoom, maxZoom: maxzoom,
         elevationDecoder: {rScaler: 256, gScaler: 1, bScaler: 1 / 256, offset: -32768},
-    });
+    })]};
 }
-async function tile3DLayer({deck, url}) {
-    return new deck.Tile3DLayer({id: 'ground', data: `${url}/3d-tiles/tileset.json`});
+// Shaders of glTF take directions of light for those to it.
+function tile3DLayer({deck: {AmbientLight, DirectionalLight, LightingEffect, Tile3DLayer}, url}) {
+    return {
+        layers: [new Tile3DLayer({id: 'ground', data: `${url}/3d-tiles/tileset.json`})],
+        effects: [new LightingEffect({ambient: new AmbientLight({intensity: 0.7}), sun: new DirectionalLight({intensity: 2, direction: [-1, 2, 1.5]})})],
+    };
 }
 
 const home = mkdtempSync(join(ROOT, 'build', 'web-tests', 'deckgl-')), database = join(home, 'terrains.gpkg');
-let service, server, browser;
+let service, server, browser, tilesUrl, heights;
 
 before(async () => {
-    for (const [name, terrain] of Object.entries(TERRAINS)) {
-        const tif = join(home, `${name}.tif`), raw = join(home, name);
-        execFileSync('gdal_translate', ['-q', '-srcwin', terrain.column, terrain.row, SIDE, SIDE, terrain.source, tif]);
-        execFileSync('gdal_translate', ['-q', '-of', 'ENVI', '-ot', 'Int16', tif, raw]);
-        execFileSync(RQT, ['import', '--name', name, tif, database], {stdio: 'pipe'});
-        const bytes = readFileSync(raw);
-        terrain.heights = new Int16Array(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length));
-    }
+    const tif = join(home, 'montserrat.tif'), raw = join(home, 'raw');
+    execFileSync('gdal_translate', ['-q', '-srcwin', COLUMN, ROW, SIDE, SIDE, SOURCE, tif]);
+    execFileSync('gdal_translate', ['-q', '-of', 'ENVI', '-ot', 'Int16', tif, raw]);
+    execFileSync(RQT, ['import', tif, database], {stdio: 'pipe'});
+    const bytes = readFileSync(raw);
+    heights = new Int16Array(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length));
     server = createServer((request, response) => {
         const isScript = request.url === '/deck.js';
         response.writeHead(200, {'Content-Type': isScript ? 'text/javascript' : 'text/html'});
@@ -61,6 +61,7 @@ before(async () => {
     });
     await new Promise(resolve => { server.listen(0, '127.0.0.1', resolve); });
     [service, browser] = await Promise.all([Service.start({databases: [database]}), launch()]);
+    tilesUrl = `${service.url}collections/montserrat/tiles`;
 });
 
 after(async () => {
@@ -70,10 +71,8 @@ after(async () => {
     rmSync(home, {recursive: true});
 });
 
-const tilesUrl = terrain => `${service.url}collections/${terrain}/tiles`;
-
-/** A page with a layer on a terrain, all of whose tiles are there: {page, problems, asked}. */
-async function open(layer, terrain, view) {
+/** A page with a layer, all of whose tiles are there: {page, problems, asked}. */
+async function open(layer) {
     const page = await browser.newPage({viewport: {width: 480, height: 320}}), problems = [], asked = [];
     page.setDefaultTimeout(PATIENCE);
     const ours = [`http://127.0.0.1:${server.address().port}`, new URL(service.url).origin];
@@ -91,11 +90,10 @@ async function open(layer, terrain, view) {
     page.on('response', response => { if (response.status() >= 400) problems.push(`${response.status()} ${response.url()}`); });
     await page.goto(ours[0]);
     await page.evaluate(async ({body, url, view: initialViewState}) => {
-        const ground = await new Function(`return (${body})`)()({deck: window.deck, url});
-        const onError = error => console.error(String(error));
-        window.shown = new window.deck.Deck({parent: document.body, initialViewState: {maxPitch: 85, ...initialViewState}, layers: [ground], onError});
+        const shown = await new Function(`return (${body})`)()({deck: window.deck, url});
+        window.shown = new window.deck.Deck({parent: document.body, initialViewState, onError: error => console.error(String(error)), ...shown});
         window.layers = () => window.shown.layerManager?.getLayers() || [];
-    }, {body: layer.toString(), url: tilesUrl(terrain), view});
+    }, {body: layer.toString(), url: tilesUrl, view: VIEW});
     await settled(page);
     return {page, problems, asked};
 }
@@ -109,6 +107,9 @@ async function settled(page) {
         }
     });
 }
+
+/** What `see` gives in the page: as one text, since numbers one by one take long. */
+const read = async (page, see) => JSON.parse(await page.evaluate(body => JSON.stringify(new Function(`return (${body})()`)()), see.toString()));
 
 /** The picture, kept; shares of it that change when the terrain is not drawn. */
 async function look(page, name) {
@@ -125,8 +126,8 @@ async function look(page, name) {
 // ----------------------------------------------------------------------------------------------------------- Terrarium
 
 /** A tile as it is served, decoded here: {height(column, row), error}. */
-async function servedTile(terrain, z, x, y) {
-    const response = await fetch(`${tilesUrl(terrain)}/terrarium/${z}/${x}/${y}.png`);
+async function servedTile(z, x, y) {
+    const response = await fetch(`${tilesUrl}/terrarium/${z}/${x}/${y}.png`);
     assert.equal(response.status, 200);
     const bytes = Buffer.from(await response.arrayBuffer()), {rgba} = decodePng(bytes);
     const error = Number(/error_metres\0([0-9.e+-]+)/.exec(bytes.toString('latin1'))[1]);
@@ -135,70 +136,185 @@ async function servedTile(terrain, z, x, y) {
 }
 
 /** The meshes that TerrainLayer has, as arrays: of a position, x, y and height; of a place in the picture, u and v. */
-const meshesOf = page => page.evaluate(() => {
+const meshesOf = page => read(page, () => {
     const {tileset} = window.layers().find(layer => layer.id === 'ground-tiles').state;
     return tileset.tiles.filter(tile => tile.content).map(({index: {z, x, y}, content: [{attributes, indices}]}) => ({
         z, x, y, positions: Array.from(attributes.POSITION.value), places: Array.from(attributes.TEXCOORD_0.value), indices: Array.from(indices.value),
     }));
 });
 
-for (const [name, view] of [['peak', {longitude: -71.303, latitude: 44.27}], ['holes', {longitude: 1.83, latitude: 41.65}]])
-    test(`TerrainLayer, ${name}: the heights of its meshes are those of the pixels, and near the samples`, async () => {
-        const {x0, y0, heights} = TERRAINS[name];
-        const {page, problems, asked} = await open(terrainLayer, name, {...view, zoom: 12.2, pitch: 60, bearing: 20});
-        const meshes = await meshesOf(page);
-        if (name === 'peak') {
-            const seen = await look(page, 'deckgl-terrain');
-            assert.ok(seen.colours > 60 && seen.share > 0.5, JSON.stringify(seen));
+test('TerrainLayer: the heights of its meshes are those of the pixels, and near the samples', async () => {
+    const {page, problems, asked} = await open(terrainLayer), meshes = await meshesOf(page), seen = await look(page, 'deckgl-terrain');
+    assert.ok(seen.colours > 60 && seen.share > 0.5, JSON.stringify(seen));
+    const levels = new Set(), pictures = asked.filter(path => path.endsWith('.png'));
+    assert.ok(meshes.length > 3 && pictures.length >= meshes.length, `${meshes.length} tiles`);
+    let samples = 0, voids = 0, worst = 0, thinned = 0;
+    for (const {z, x, y, positions, places, indices} of meshes) {
+        const {height, error} = await servedTile(z, x, y), label = `${z}/${x}/${y}`, at = new Map(), world = 512 / 2 ** z;
+        const pixel = (i, j) => height(Math.min(i, PIXELS - 1), Math.min(j, PIXELS - 1));
+        for (let v = 0; v < places.length / 2; v++) {
+            const [i, j] = [PIXELS * places[2 * v], PIXELS * places[2 * v + 1]], key = PIXELS * 2 * j + i;
+            if (at.has(key)) continue; // of a skirt, below
+            at.set(key, v);
+            assert.equal(positions[3 * v + 2], pixel(i, j), `${label}: height of pixel ${i}, ${j}`);
+            // Where the tile is, but for a pixel that neighbours overlap by.
+            const off = Math.max(Math.abs(positions[3 * v] - world * (x + i / PIXELS)), Math.abs(512 - positions[3 * v + 1] - world * (y + j / PIXELS)));
+            assert.ok(off <= world / PIXELS * 1.01, `${label}: pixel ${i}, ${j} is ${off * PIXELS / world} pixels off`);
         }
-        const levels = new Set(), pictures = asked.filter(path => path.endsWith('.png'));
-        assert.ok(meshes.length > 3 && pictures.length >= meshes.length, `${meshes.length} tiles`);
-        let samples = 0, voids = 0, worst = 0, thinned = 0;
-        for (const {z, x, y, positions, places, indices} of meshes) {
-            const {height, error} = await servedTile(name, z, x, y), label = `${z}/${x}/${y}`, at = new Map(), world = 512 / 2 ** z;
-            const pixel = (i, j) => height(Math.min(i, PIXELS - 1), Math.min(j, PIXELS - 1));
-            for (let v = 0; v < places.length / 2; v++) {
-                const [i, j] = [PIXELS * places[2 * v], PIXELS * places[2 * v + 1]], key = PIXELS * 2 * j + i;
-                if (at.has(key)) continue; // of a skirt, below
-                at.set(key, v);
-                assert.equal(positions[3 * v + 2], pixel(i, j), `${label}: height of pixel ${i}, ${j}`);
-                // Where the tile is, but for a pixel that neighbours overlap by.
-                const off = Math.max(Math.abs(positions[3 * v] - world * (x + i / PIXELS)), Math.abs(512 - positions[3 * v + 1] - world * (y + j / PIXELS)));
-                assert.ok(off <= world / PIXELS * 1.01, `${label}: pixel ${i}, ${j} is ${off * PIXELS / world} pixels off`);
-            }
-            // The mesh at every pixel; and what is interpolated of that at every sample.
-            const mesh = new Float64Array((PIXELS + 1) ** 2).fill(NaN), count = Math.max(...at.values()) + 1;
-            const of = (from, width, k, scale) => Float64Array.from({length: count}, (_, v) => from[width * v + k] * scale);
-            const triangles = indices.filter((_, i) => indices.slice(i - i % 3, i - i % 3 + 3).every(v => v < count));
-            heightsUnder({x: of(places, 2, 0, PIXELS), y: of(places, 2, 1, PIXELS), z: of(positions, 3, 2, 1), triangles}, PIXELS + 1, PIXELS + 1,
-                (i, j, h) => { mesh[(PIXELS + 1) * j + i] = h; });
-            let off = 0;
-            mesh.forEach((h, k) => { off = Math.max(off, Math.abs(h - pixel(k % (PIXELS + 1), Math.floor(k / (PIXELS + 1))))); });
-            assert.ok(off >= 0, `${label}: it covers all pixels`);
-            thinned = Math.max(thinned, off);
-            for (let row = 0; row < SIDE; row++) {
-                const latitude = (y0 - row * STEP) * RADIANS, q = PIXELS * ((1 - Math.asinh(Math.tan(latitude)) / Math.PI) / 2 * 2 ** z - y) - 0.5;
-                if (q < 0 || q >= PIXELS - 1) continue;
-                for (let col = 0; col < SIDE; col++) {
-                    const p = PIXELS * ((x0 + col * STEP + 180) / 360 * 2 ** z - x) - 0.5, sample = heights[SIDE * row + col];
-                    if (p < 0 || p >= PIXELS - 1) continue;
-                    const k = (PIXELS + 1) * Math.floor(q) + Math.floor(p), a = p % 1, b = q % 1;
-                    const seen = (1 - b) * ((1 - a) * mesh[k] + a * mesh[k + 1]) + b * ((1 - a) * mesh[k + PIXELS + 1] + a * mesh[k + PIXELS + 2]);
-                    const corners = [k, k + 1, k + PIXELS + 1, k + PIXELS + 2].map(c => pixel(c % (PIXELS + 1), Math.floor(c / (PIXELS + 1))));
-                    if (sample === VOID) voids += corners.includes(0);
-                    else if (!corners.includes(0)) {
-                        const share = Math.abs(seen - sample) / (error + off);
-                        assert.ok(share <= 1, `${label}: ${seen} m where it is ${sample}, ${error} m stated and ${off} m thinned`);
-                        worst = Math.max(worst, share);
-                        samples++;
-                    }
+        // The mesh at every pixel; and what is interpolated of that at every sample.
+        const mesh = new Float64Array((PIXELS + 1) ** 2).fill(NaN), count = Math.max(...at.values()) + 1;
+        const of = (from, width, k, scale) => Float64Array.from({length: count}, (_, v) => from[width * v + k] * scale);
+        const triangles = indices.filter((_, i) => Math.max(...[0, 1, 2].map(k => indices[i - i % 3 + k])) < count);
+        heightsUnder({x: of(places, 2, 0, PIXELS), y: of(places, 2, 1, PIXELS), z: of(positions, 3, 2, 1), triangles}, PIXELS + 1, PIXELS + 1,
+            (i, j, h) => { mesh[(PIXELS + 1) * j + i] = h; });
+        let off = 0;
+        mesh.forEach((h, k) => { off = Math.max(off, Math.abs(h - pixel(k % (PIXELS + 1), Math.floor(k / (PIXELS + 1))))); });
+        assert.ok(off >= 0 && off < 20, `${label}: a mesh ${off} m off its own pixels`); // NaN: it does not cover them
+        thinned = Math.max(thinned, off);
+        for (let row = 0; row < SIDE; row++) {
+            const latitude = (Y0 - row * STEP) * RADIANS, q = PIXELS * ((1 - Math.asinh(Math.tan(latitude)) / Math.PI) / 2 * 2 ** z - y) - 0.5;
+            if (q < 0 || q >= PIXELS - 1) continue;
+            for (let col = 0; col < SIDE; col++) {
+                const p = PIXELS * ((X0 + col * STEP + 180) / 360 * 2 ** z - x) - 0.5, sample = heights[SIDE * row + col];
+                if (p < 0 || p >= PIXELS - 1) continue;
+                const k = (PIXELS + 1) * Math.floor(q) + Math.floor(p), a = p % 1, b = q % 1;
+                const interpolated = (1 - b) * ((1 - a) * mesh[k] + a * mesh[k + 1]) + b * ((1 - a) * mesh[k + PIXELS + 1] + a * mesh[k + PIXELS + 2]);
+                const corners = [k, k + 1, k + PIXELS + 1, k + PIXELS + 2].map(c => pixel(c % (PIXELS + 1), Math.floor(c / (PIXELS + 1))));
+                if (sample === VOID) voids += corners.includes(0);
+                else if (!corners.includes(0)) {
+                    const share = Math.abs(interpolated - sample) / (error + off);
+                    assert.ok(share <= 1, `${label}: ${interpolated} m where it is ${sample}, ${error} m stated and ${off} m thinned`);
+                    worst = Math.max(worst, share);
+                    samples++;
                 }
             }
-            levels.add(z);
         }
-        console.log(`${name}: ${meshes.length} tiles of levels ${[...levels]}, ${samples} samples, ${worst} of what is allowed, ${voids} voids; deck.gl leaves out up to ${thinned} m`);
-        assert.ok(samples > 50000 && worst > 0.1);
-        assert.equal(voids > 0, name === 'holes');
-        assert.deepEqual(problems, []);
-        await page.close();
+        levels.add(z);
+    }
+    console.log(`TerrainLayer: ${meshes.length} tiles of levels ${[...levels]}, ${samples} samples, ${worst} of what is allowed, ${voids} voids; deck.gl leaves out up to ${thinned} m`);
+    assert.ok(samples > 50000 && worst > 0.1);
+    assert.ok(voids > 0);
+    assert.deepEqual(problems, []);
+    await page.close();
+});
+
+// ------------------------------------------------------------------------------------------------------------ 3D Tiles
+
+/** What Tile3DLayer has of the tiles that it drew, and the addresses of all that it knows of. */
+const blocksOf = page => read(page, () => {
+    const {root, tiles} = window.layers().find(layer => layer.id === 'ground').state.tileset3d, known = [];
+    const walk = header => {
+        if (header.contentUrl) known.push(header.contentUrl);
+        (header.children || []).forEach(walk);
+    };
+    walk(root.header);
+    const numbers = matrix => Array.from(matrix);
+    return {known, tiles: tiles.filter(({content}) => content?.gltf).map(({contentUrl, lodMetricValue, header, content}) => {
+        const {gltf, cartesianModelMatrix, cartographicModelMatrix} = content, [node] = gltf.scene.nodes;
+        return {
+            contentUrl, bound: lodMetricValue, region: header.boundingVolume.region,
+            told: gltf.asset.extras.rqt, node: numbers(node.matrix || [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, ...node.translation, 1]),
+            toSpace: numbers(cartesianModelMatrix), toOrigin: numbers(cartographicModelMatrix),
+            positions: numbers(gltf.meshes[0].primitives[0].attributes.POSITION.value),
+        };
+    })};
+});
+
+/** A matrix, column by column, times a place. */
+const times = (m, [x, y, z], round = v => v) => [0, 1, 2].map(k => round(round(round(m[k] * x) + round(m[k + 4] * y)) + round(round(m[k + 8] * z) + m[k + 12])));
+
+/** Longitudes, latitudes and heights above the ellipsoid to places in space, by PROJ. */
+function inSpace(places) {
+    const lines = execFileSync('gdaltransform', ['-s_srs', 'EPSG:4979', '-t_srs', 'EPSG:4978'], {input: places.map(place => place.join(' ')).join('\n'), encoding: 'utf8', maxBuffer: 2 ** 26});
+    return lines.trim().split('\n').map(line => line.split(' ').map(Number));
+}
+
+test('Tile3DLayer: it knows of the tiles that there are, and their vertices are samples in space', async () => {
+    const {page, problems} = await open(tile3DLayer), {known, tiles} = await blocksOf(page), seen = await look(page, 'deckgl-3d-tiles');
+    assert.ok(seen.colours > 60 && seen.share > 0.5, JSON.stringify(seen));
+    const files = join(home, 'blocks');
+    execFileSync(RQT, ['tiles', database, '--kind', '3d-tiles', '-o', files], {stdio: 'pipe'});
+    const written = readdirSync(join(files, 'content'), {recursive: true}).filter(path => path.endsWith('.glb'));
+    assert.deepEqual(known.map(url => url.split('/content/')[1]).sort(), written.sort());
+    const levels = new Set(tiles.map(({told}) => told.level));
+    assert.ok(tiles.length > 5 && levels.size > 1, `${tiles.length} tiles of levels ${[...levels]}`);
+    const places = [], vertices = [];
+    let rounded = 0;
+    for (const {contentUrl, bound, region, told, node, toSpace, toOrigin, positions} of tiles) {
+        assert.ok(told.error <= bound, `${contentUrl}: off by ${told.error} m, and deck.gl takes it for ${bound}`);
+        // In floats, as a graphics card has them: no worse than floats of the tile's own size.
+        const corners = [], floats = {node: node.map(Math.fround), toOrigin: toOrigin.map(Math.fround)};
+        let reach = 0, off = 0;
+        for (let i = 0; i < positions.length; i += 3) {
+            const position = positions.slice(i, i + 3), exact = times(toOrigin, times(node, position));
+            const drawn = times(floats.toOrigin, times(floats.node, position, Math.fround), Math.fround);
+            reach = Math.max(reach, Math.hypot(...exact));
+            off = Math.max(off, Math.hypot(...drawn.map((v, k) => v - exact[k])));
+            corners.push(times(toSpace, times(node, position)));
+        }
+        rounded = Math.max(rounded, off);
+        assert.ok(off <= reach * 2 ** -21, `${contentUrl}: floats are ${off} m off, of ${reach} m`);
+        for (const xyz of corners) {
+            const [longitude, latitude] = geodetic(xyz);
+            const col = Math.round((longitude - X0) / STEP), row = Math.round((Y0 - latitude) / STEP), sample = heights[SIDE * row + col];
+            assert.ok(col >= 0 && col < SIDE && row >= 0 && row < SIDE && sample !== VOID, `${contentUrl}: ${longitude}, ${latitude} is no sample`);
+            const [west, south, east, north] = region.map(r => r / RADIANS);
+            assert.ok(longitude > west - 1e-7 && longitude < east + 1e-7 && latitude > south - 1e-7 && latitude < north + 1e-7, `${contentUrl}: ${longitude}, ${latitude} is beyond what deck.gl takes for its region`);
+            places.push([X0 + col * STEP, Y0 - row * STEP, sample]);
+            vertices.push({xyz, contentUrl, step: told.step});
+        }
+    }
+    let worst = 0;
+    inSpace(places).forEach((place, i) => {
+        const off = Math.hypot(...place.map((v, k) => v - vertices[i].xyz[k])) - vertices[i].step * Math.sqrt(3) / 2;
+        assert.ok(off < 1e-6, `${vertices[i].contentUrl}: ${vertices[i].xyz} is ${off} m off beyond its step`);
+        worst = Math.max(worst, off + vertices[i].step * Math.sqrt(3) / 2);
     });
+    console.log(`Tile3DLayer: ${tiles.length} tiles of levels ${[...levels].sort()}, ${places.length} vertices, off by ${worst} m at most; ${rounded} m in floats`);
+    assert.deepEqual(problems, []);
+    await page.close();
+});
+
+/** Longitude and latitude of a place in space, in degrees. */
+function geodetic([x, y, z]) {
+    const f = 1 / 298.257223563, e2 = f * (2 - f), flat = Math.hypot(x, y);
+    let latitude = Math.atan2(z, flat * (1 - e2));
+    for (let i = 0; i < 5; i++) latitude = Math.atan2(z + e2 * 6378137 / Math.sqrt(1 - e2 * Math.sin(latitude) ** 2) * Math.sin(latitude), flat);
+    return [Math.atan2(y, x) / RADIANS, latitude / RADIANS];
+}
+
+// ------------------------------------------------------------------------------------------------------ quantized-mesh
+
+/** What a script for pages that is also one for require() gives. */
+function load(file) {
+    const module = {exports: {}};
+    new Function('module', 'exports', readFileSync(join(PACKAGES, file), 'utf8'))(module, module.exports);
+    return module.exports;
+}
+
+test('the decoder of quantized-mesh that deck.gl has: heights are within the stated error at every sample', () => {
+    const {QuantizedMeshLoader} = load('loaders.gl-terrain/dist/dist.min.js'), files = join(home, 'meshes');
+    execFileSync(RQT, ['tiles', database, '-o', files], {stdio: 'pipe'});
+    let samples = 0, worst = 0, tiles = 0;
+    for (const path of readdirSync(files, {recursive: true}).filter(file => file.endsWith('.terrain'))) {
+        const [z, column, row] = path.split('/').map(text => parseInt(text, 10)), side = 180 / 2 ** z / STEP;
+        const bytes = readFileSync(join(files, path)), data = bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length);
+        const {verticalError} = decodeMesh(data.slice(0)).extensions.metadata;
+        if (!verticalError) continue; // without terrain
+        const {attributes: {POSITION: {value: positions}}, indices: {value: triangles}} = QuantizedMeshLoader.parseSync(data);
+        // It gives floats, of which units are made again.
+        const of = (k, turn) => Float64Array.from({length: positions.length / 3}, (_, i) => turn(positions[3 * i + k]));
+        const unit = v => Math.round(v * 32767) / 32767, west = (-180 - X0) / STEP + column * side, south = (Y0 + 90) / STEP - row * side;
+        heightsUnder({x: of(0, u => west + side * unit(u)), y: of(1, v => south - side * unit(v)), z: of(2, v => v), triangles}, SIDE, SIDE, (col, line, height) => {
+            const sample = heights[SIDE * line + col];
+            if (sample === VOID) return; // outlines of voids move as vertices do
+            const share = Math.abs(height - sample) / (verticalError + 1e-3);
+            assert.ok(share <= 1, `${path}: ${height} m at ${col}, ${line}, where it is ${sample}`);
+            worst = Math.max(worst, share);
+            samples++;
+        });
+        tiles++;
+    }
+    console.log(`quantized-mesh: ${tiles} tiles, ${samples} samples, ${worst} of what is stated`);
+    assert.ok(tiles > 20 && samples > 5 * SIDE * SIDE && worst > 0.1);
+});
