@@ -22,7 +22,7 @@ const SHOTS = process.env.WEB_SHOTS || join(ROOT, 'build', 'web-shots');
 const PAGE = `<!doctype html><meta charset="utf-8"><title>terrain</title><link rel="icon" href="data:,">
 <style>html, body { margin: 0; height: 100%; background: #b8d4e8 }</style><script src="deck.js"></script>`;
 const VOID = -32768, PIXELS = 256, STEP = 1 / 1200, RADIANS = Math.PI / 180;
-// Cells of 15/16 of a power of two: the first subtree is full, and the tiles below it are not.
+// 15 blocks of 32 a side: the first subtree is full, and what is below it is not.
 const SIDE = 471;
 // A part of a degree square: Montserrat, with voids at its cliffs.
 const SOURCE = join(ROOT, 'tests', 'data', 'N41E001.hgt.zip'), COLUMN = 700, ROW = 180, X0 = 1 + COLUMN * STEP, Y0 = 42 - ROW * STEP;
@@ -51,7 +51,7 @@ before(async () => {
     const tif = join(home, 'montserrat.tif'), raw = join(home, 'raw');
     execFileSync('gdal_translate', ['-q', '-srcwin', COLUMN, ROW, SIDE, SIDE, SOURCE, tif]);
     execFileSync('gdal_translate', ['-q', '-of', 'ENVI', '-ot', 'Int16', tif, raw]);
-    execFileSync(RQT, ['import', tif, database], {stdio: 'pipe'});
+    execFileSync(RQT, ['import', '--block', '5', tif, database], {stdio: 'pipe'});
     const bytes = readFileSync(raw);
     heights = new Int16Array(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length));
     server = createServer((request, response) => {
