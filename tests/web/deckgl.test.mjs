@@ -57,7 +57,7 @@ before(async () => {
     server = createServer((request, response) => {
         const isScript = request.url === '/deck.js';
         response.writeHead(200, {'Content-Type': isScript ? 'text/javascript' : 'text/html'});
-        response.end(isScript ? readFileSync(join(PACKAGES, 'deck.gl', 'dist.min.js')) : PAGE);
+        response.end(isScript ? readFileSync(join(PACKAGES, 'dist.min.js')) : PAGE);
     });
     await new Promise(resolve => { server.listen(0, '127.0.0.1', resolve); });
     [service, browser] = await Promise.all([Service.start({databases: [database]}), launch()]);
@@ -78,7 +78,7 @@ async function open(layer) {
     const ours = [`http://127.0.0.1:${server.address().port}`, new URL(service.url).origin];
     // Where it is on the network, deck.gl has its worker from there: here it is from the package.
     const isWorker = ({pathname}) => pathname.endsWith('/terrain@4.4.3/dist/terrain-worker.js');
-    await page.route(isWorker, route => route.fulfill({path: join(PACKAGES, 'loaders.gl-terrain', 'dist', 'terrain-worker.js')}));
+    await page.route(isWorker, route => route.fulfill({path: join(PACKAGES, 'dist', 'terrain-worker.js')}));
     page.on('console', message => { if (['error', 'warning', 'assert'].includes(message.type())) problems.push(message.text()); });
     page.on('pageerror', error => problems.push(error.stack));
     page.on('request', request => {
@@ -122,81 +122,6 @@ async function look(page, name) {
     const {width, height} = picture, empty = decodePng(await page.screenshot());
     return {colours: colours(picture), share: differingPixels(picture, empty) / width / height};
 }
-
-// ----------------------------------------------------------------------------------------------------------- Terrarium
-
-/** A tile as it is served, decoded here: {height(column, row), error}. */
-async function servedTile(z, x, y) {
-    const response = await fetch(`${tilesUrl}/terrarium/${z}/${x}/${y}.png`);
-    assert.equal(response.status, 200);
-    const bytes = Buffer.from(await response.arrayBuffer()), {rgba} = decodePng(bytes);
-    const error = Number(/error_metres\0([0-9.e+-]+)/.exec(bytes.toString('latin1'))[1]);
-    const height = (i, j) => rgba[4 * (PIXELS * j + i)] * 256 + rgba[4 * (PIXELS * j + i) + 1] + rgba[4 * (PIXELS * j + i) + 2] / 256 - 32768;
-    return {height, error};
-}
-
-/** The meshes that TerrainLayer has, as arrays: of a position, x, y and height; of a place in the picture, u and v. */
-const meshesOf = page => read(page, () => {
-    const {tileset} = window.layers().find(layer => layer.id === 'ground-tiles').state;
-    return tileset.tiles.filter(tile => tile.content).map(({index: {z, x, y}, content: [{attributes, indices}]}) => ({
-        z, x, y, positions: Array.from(attributes.POSITION.value), places: Array.from(attributes.TEXCOORD_0.value), indices: Array.from(indices.value),
-    }));
-});
-
-test('TerrainLayer: the heights of its meshes are those of the pixels, and near the samples', async () => {
-    const {page, problems, asked} = await open(terrainLayer), meshes = await meshesOf(page), seen = await look(page, 'deckgl-terrain');
-    assert.ok(seen.colours > 60 && seen.share > 0.5, JSON.stringify(seen));
-    const levels = new Set(), pictures = asked.filter(path => path.endsWith('.png'));
-    assert.ok(meshes.length > 3 && pictures.length >= meshes.length, `${meshes.length} tiles`);
-    let samples = 0, voids = 0, worst = 0, thinned = 0;
-    for (const {z, x, y, positions, places, indices} of meshes) {
-        const {height, error} = await servedTile(z, x, y), label = `${z}/${x}/${y}`, at = new Map(), world = 512 / 2 ** z;
-        const pixel = (i, j) => height(Math.min(i, PIXELS - 1), Math.min(j, PIXELS - 1));
-        for (let v = 0; v < places.length / 2; v++) {
-            const [i, j] = [PIXELS * places[2 * v], PIXELS * places[2 * v + 1]], key = PIXELS * 2 * j + i;
-            if (at.has(key)) continue; // of a skirt, below
-            at.set(key, v);
-            assert.equal(positions[3 * v + 2], pixel(i, j), `${label}: height of pixel ${i}, ${j}`);
-            // Where the tile is, but for a pixel that neighbours overlap by.
-            const off = Math.max(Math.abs(positions[3 * v] - world * (x + i / PIXELS)), Math.abs(512 - positions[3 * v + 1] - world * (y + j / PIXELS)));
-            assert.ok(off <= world / PIXELS * 1.01, `${label}: pixel ${i}, ${j} is ${off * PIXELS / world} pixels off`);
-        }
-        // The mesh at every pixel; and what is interpolated of that at every sample.
-        const mesh = new Float64Array((PIXELS + 1) ** 2).fill(NaN), count = Math.max(...at.values()) + 1;
-        const of = (from, width, k, scale) => Float64Array.from({length: count}, (_, v) => from[width * v + k] * scale);
-        const triangles = indices.filter((_, i) => Math.max(...[0, 1, 2].map(k => indices[i - i % 3 + k])) < count);
-        heightsUnder({x: of(places, 2, 0, PIXELS), y: of(places, 2, 1, PIXELS), z: of(positions, 3, 2, 1), triangles}, PIXELS + 1, PIXELS + 1,
-            (i, j, h) => { mesh[(PIXELS + 1) * j + i] = h; });
-        let off = 0;
-        mesh.forEach((h, k) => { off = Math.max(off, Math.abs(h - pixel(k % (PIXELS + 1), Math.floor(k / (PIXELS + 1))))); });
-        assert.ok(off >= 0 && off < 20, `${label}: a mesh ${off} m off its own pixels`); // NaN: it does not cover them
-        thinned = Math.max(thinned, off);
-        for (let row = 0; row < SIDE; row++) {
-            const latitude = (Y0 - row * STEP) * RADIANS, q = PIXELS * ((1 - Math.asinh(Math.tan(latitude)) / Math.PI) / 2 * 2 ** z - y) - 0.5;
-            if (q < 0 || q >= PIXELS - 1) continue;
-            for (let col = 0; col < SIDE; col++) {
-                const p = PIXELS * ((X0 + col * STEP + 180) / 360 * 2 ** z - x) - 0.5, sample = heights[SIDE * row + col];
-                if (p < 0 || p >= PIXELS - 1) continue;
-                const k = (PIXELS + 1) * Math.floor(q) + Math.floor(p), a = p % 1, b = q % 1;
-                const interpolated = (1 - b) * ((1 - a) * mesh[k] + a * mesh[k + 1]) + b * ((1 - a) * mesh[k + PIXELS + 1] + a * mesh[k + PIXELS + 2]);
-                const corners = [k, k + 1, k + PIXELS + 1, k + PIXELS + 2].map(c => pixel(c % (PIXELS + 1), Math.floor(c / (PIXELS + 1))));
-                if (sample === VOID) voids += corners.includes(0);
-                else if (!corners.includes(0)) {
-                    const share = Math.abs(interpolated - sample) / (error + off);
-                    assert.ok(share <= 1, `${label}: ${interpolated} m where it is ${sample}, ${error} m stated and ${off} m thinned`);
-                    worst = Math.max(worst, share);
-                    samples++;
-                }
-            }
-        }
-        levels.add(z);
-    }
-    console.log(`TerrainLayer: ${meshes.length} tiles of levels ${[...levels]}, ${samples} samples, ${worst} of what is allowed, ${voids} voids; deck.gl leaves out up to ${thinned} m`);
-    assert.ok(samples > 50000 && worst > 0.1);
-    assert.ok(voids > 0);
-    assert.deepEqual(problems, []);
-    await page.close();
-});
 
 // ------------------------------------------------------------------------------------------------------------ 3D Tiles
 
@@ -293,7 +218,7 @@ function load(file) {
 }
 
 test('the decoder of quantized-mesh that deck.gl has: heights are within the stated error at every sample', () => {
-    const {QuantizedMeshLoader} = load('loaders.gl-terrain/dist/dist.min.js'), files = join(home, 'meshes');
+    const {QuantizedMeshLoader} = load(join('dist', 'dist.min.js')), files = join(home, 'meshes');
     execFileSync(RQT, ['tiles', database, '-o', files], {stdio: 'pipe'});
     let samples = 0, worst = 0, tiles = 0;
     for (const path of readdirSync(files, {recursive: true}).filter(file => file.endsWith('.terrain'))) {
@@ -317,4 +242,79 @@ test('the decoder of quantized-mesh that deck.gl has: heights are within the sta
     }
     console.log(`quantized-mesh: ${tiles} tiles, ${samples} samples, ${worst} of what is stated`);
     assert.ok(tiles > 20 && samples > 5 * SIDE * SIDE && worst > 0.1);
+});
+
+// ----------------------------------------------------------------------------------------------------------- Terrarium
+
+/** A tile as it is served, decoded here: {height(column, row), error}. */
+async function servedTile(z, x, y) {
+    const response = await fetch(`${tilesUrl}/terrarium/${z}/${x}/${y}.png`);
+    assert.equal(response.status, 200);
+    const bytes = Buffer.from(await response.arrayBuffer()), {rgba} = decodePng(bytes);
+    const error = Number(/error_metres\0([0-9.e+-]+)/.exec(bytes.toString('latin1'))[1]);
+    const height = (i, j) => rgba[4 * (PIXELS * j + i)] * 256 + rgba[4 * (PIXELS * j + i) + 1] + rgba[4 * (PIXELS * j + i) + 2] / 256 - 32768;
+    return {height, error};
+}
+
+/** The meshes that TerrainLayer has, as arrays: of a position, x, y and height; of a place in the picture, u and v. */
+const meshesOf = page => read(page, () => {
+    const {tileset} = window.layers().find(layer => layer.id === 'ground-tiles').state;
+    return tileset.tiles.filter(tile => tile.content).map(({index: {z, x, y}, content: [{attributes, indices}]}) => ({
+        z, x, y, positions: Array.from(attributes.POSITION.value), places: Array.from(attributes.TEXCOORD_0.value), indices: Array.from(indices.value),
+    }));
+});
+
+test('TerrainLayer: the heights of its meshes are those of the pixels, and near the samples', async () => {
+    const {page, problems, asked} = await open(terrainLayer), meshes = await meshesOf(page), seen = await look(page, 'deckgl-terrain');
+    assert.ok(seen.colours > 60 && seen.share > 0.5, JSON.stringify(seen));
+    const levels = new Set(), pictures = asked.filter(path => path.endsWith('.png'));
+    assert.ok(meshes.length > 3 && pictures.length >= meshes.length, `${meshes.length} tiles`);
+    let samples = 0, voids = 0, worst = 0, thinned = 0;
+    for (const {z, x, y, positions, places, indices} of meshes) {
+        const {height, error} = await servedTile(z, x, y), label = `${z}/${x}/${y}`, at = new Map(), world = 512 / 2 ** z;
+        const pixel = (i, j) => height(Math.min(i, PIXELS - 1), Math.min(j, PIXELS - 1));
+        for (let v = 0; v < places.length / 2; v++) {
+            const [i, j] = [PIXELS * places[2 * v], PIXELS * places[2 * v + 1]], key = PIXELS * 2 * j + i;
+            if (at.has(key)) continue; // of a skirt, below
+            at.set(key, v);
+            assert.equal(positions[3 * v + 2], pixel(i, j), `${label}: height of pixel ${i}, ${j}`);
+            // Where the tile is, but for a pixel that neighbours overlap by.
+            const off = Math.max(Math.abs(positions[3 * v] - world * (x + i / PIXELS)), Math.abs(512 - positions[3 * v + 1] - world * (y + j / PIXELS)));
+            assert.ok(off <= world / PIXELS * 1.01, `${label}: pixel ${i}, ${j} is ${off * PIXELS / world} pixels off`);
+        }
+        // The mesh at every pixel; and what is interpolated of that at every sample.
+        const mesh = new Float64Array((PIXELS + 1) ** 2).fill(NaN), count = Math.max(...at.values()) + 1;
+        const of = (from, width, k, scale) => Float64Array.from({length: count}, (_, v) => from[width * v + k] * scale);
+        const triangles = indices.filter((_, i) => Math.max(...[0, 1, 2].map(k => indices[i - i % 3 + k])) < count);
+        heightsUnder({x: of(places, 2, 0, PIXELS), y: of(places, 2, 1, PIXELS), z: of(positions, 3, 2, 1), triangles}, PIXELS + 1, PIXELS + 1,
+            (i, j, h) => { mesh[(PIXELS + 1) * j + i] = h; });
+        let off = 0;
+        mesh.forEach((h, k) => { off = Math.max(off, Math.abs(h - pixel(k % (PIXELS + 1), Math.floor(k / (PIXELS + 1))))); });
+        assert.ok(off >= 0 && off < 20, `${label}: a mesh ${off} m off its own pixels`); // NaN: it does not cover them
+        thinned = Math.max(thinned, off);
+        for (let row = 0; row < SIDE; row++) {
+            const latitude = (Y0 - row * STEP) * RADIANS, q = PIXELS * ((1 - Math.asinh(Math.tan(latitude)) / Math.PI) / 2 * 2 ** z - y) - 0.5;
+            if (q < 0 || q >= PIXELS - 1) continue;
+            for (let col = 0; col < SIDE; col++) {
+                const p = PIXELS * ((X0 + col * STEP + 180) / 360 * 2 ** z - x) - 0.5, sample = heights[SIDE * row + col];
+                if (p < 0 || p >= PIXELS - 1) continue;
+                const k = (PIXELS + 1) * Math.floor(q) + Math.floor(p), a = p % 1, b = q % 1;
+                const interpolated = (1 - b) * ((1 - a) * mesh[k] + a * mesh[k + 1]) + b * ((1 - a) * mesh[k + PIXELS + 1] + a * mesh[k + PIXELS + 2]);
+                const corners = [k, k + 1, k + PIXELS + 1, k + PIXELS + 2].map(c => pixel(c % (PIXELS + 1), Math.floor(c / (PIXELS + 1))));
+                if (sample === VOID) voids += corners.includes(0);
+                else if (!corners.includes(0)) {
+                    const share = Math.abs(interpolated - sample) / (error + off);
+                    assert.ok(share <= 1, `${label}: ${interpolated} m where it is ${sample}, ${error} m stated and ${off} m thinned`);
+                    worst = Math.max(worst, share);
+                    samples++;
+                }
+            }
+        }
+        levels.add(z);
+    }
+    console.log(`TerrainLayer: ${meshes.length} tiles of levels ${[...levels]}, ${samples} samples, ${worst} of what is allowed, ${voids} voids; deck.gl leaves out up to ${thinned} m`);
+    assert.ok(samples > 50000 && worst > 0.1);
+    assert.ok(voids > 0);
+    assert.deepEqual(problems, []);
+    await page.close();
 });

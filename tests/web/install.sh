@@ -2,11 +2,11 @@
 # install.sh - puts what the tests of the page take from npm into build/web-tests, unless it is there: the packages that
 # package-lock.json names, and deck.gl.
 #
-# Of deck.gl it is the script that pages load, all in one, and the worker that this script loads: two packages without the
-# hundred and forty that they name, from which the script was made. Their sums are in deckgl.sha512.
+# Of deck.gl it is the script that pages load, all in one, and the worker and the decoders of its loaders: three files of
+# two packages, whose sums are in deckgl.sha512, without the hundred and forty packages that those name.
 set -eu
 cd "$(dirname "$0")/../.."
-packages=build/web-tests
+packages=build/web-tests deckgl=build/web-tests/deckgl
 mkdir -p "$packages"
 fail() {
     cat "$packages/npm.log"
@@ -18,14 +18,18 @@ if ! cmp -s tests/web/package-lock.json "$packages/installed.json"; then
     (cd "$packages" && npm ci --ignore-scripts --no-audit --no-fund >npm.log 2>&1) || fail "playwright-core and gltf-validator"
     cp tests/web/package-lock.json "$packages/installed.json"
 fi
-if ! cmp -s tests/web/deckgl.sha512 "$packages/deckgl/installed.sha512"; then
-    rm -rf "$packages/deckgl"
-    mkdir "$packages/deckgl"
-    cp tests/web/deckgl.sha512 tests/web/.npmrc "$packages/deckgl/"
+if ! cmp -s tests/web/deckgl.sha512 "$deckgl/installed.sha512"; then
+    rm -rf "$deckgl"
+    mkdir "$deckgl"
+    sums=$PWD/tests/web/deckgl.sha512
+    unpack() { # package, files
+        local archive=$1
+        shift
+        tar -xzf "$archive"-*.tgz --strip-components=1 "${@/#/package/}" && rm "$archive"-*.tgz
+    }
     (
-        unpack() { mkdir "$1" && tar -xzf "$1"-*.tgz -C "$1" --strip-components=1; }
-        cd "$packages/deckgl" && npm pack deck.gl@9.4.0 @loaders.gl/terrain@4.4.3 && sha512sum -c deckgl.sha512 &&
-            unpack deck.gl && unpack loaders.gl-terrain
+        cd "$deckgl" && npm pack deck.gl@9.4.0 @loaders.gl/terrain@4.4.3 && sha512sum -c "$sums" &&
+            unpack deck.gl dist.min.js && unpack loaders.gl-terrain dist/dist.min.js dist/terrain-worker.js
     ) >"$packages/npm.log" 2>&1 || fail deck.gl
-    mv "$packages/deckgl/deckgl.sha512" "$packages/deckgl/installed.sha512"
+    cp tests/web/deckgl.sha512 "$deckgl/installed.sha512"
 fi
