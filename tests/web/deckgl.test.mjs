@@ -100,12 +100,13 @@ async function open(layer) {
 
 /** Until every tile that the picture needs is in it, for some frames: tiles make it ask for others. */
 async function settled(page) {
-    await page.evaluate(async () => {
-        for (let still = 0; still < 5; still++) {
+    const left = await page.evaluate(async patience => {
+        const isLoaded = () => window.layers().length > 1 && window.layers().every(layer => layer.isLoaded);
+        for (let still = 0, end = Date.now() + patience; still < 5 && Date.now() < end; still = isLoaded() ? still + 1 : 0)
             await new Promise(resolve => requestAnimationFrame(resolve));
-            if (window.layers().length < 2 || !window.layers().every(layer => layer.isLoaded)) still = -1;
-        }
-    });
+        return window.layers().filter(layer => !layer.isLoaded).map(layer => layer.id);
+    }, PATIENCE);
+    assert.deepEqual(left, [], 'it settles');
 }
 
 /** What `see` gives in the page: as one text, since numbers one by one take long. */
