@@ -23,7 +23,7 @@ MUTANTS = [
     ("3d-tiles: normals are those of glTF's other axis", GLB, "*p++ = (uint8_t)n[2];", "*p++ = (uint8_t)n[1];", TILES, "normals"),
     # places
     ("3d-tiles: rows count from the north", TILE, "(INT64_C(1) << level) - 1 - y", "y", TILES, "as the formats have them"),
-    ("3d-tiles: regions do not sink with their chords", TILE, "region[4] = relief->lowest + low - moved;", "region[4] = relief->lowest + low;", TILES, "lie in their regions"),
+    ("3d-tiles: regions do not sink with their chords", TILE, "region[4] = relief->lowest + low - moved - block_skirt_depth(t, tile);", "region[4] = relief->lowest + low - block_skirt_depth(t, tile);", TILES, "and so do their skirts"),
     ("3d-tiles: regions do not bulge to the pole", TILE, "box[3] + bulge, region", "box[3], region", TILES, "lie in their regions"),
     ("3d-tiles: a tile knows no more than the terrain", SUBTREE, "int code = block_relief(t, tile, relief, error);", "int code = SQLITE_OK;", TILES, "a tile tells the error"),
     ("3d-tiles: heights are the geoid's", MESH, "geo_frame_height(block_plan_of(t)->frame, place)", "place[2]", TILES, "geoid: every vertex is a sample"),
