@@ -32,6 +32,7 @@ struct tiles {
     const store_terrain *terrain; /* likewise */
     void *plan;                   /* likewise: the kind's own */
     int last;                     /* likewise: of tiles_tell */
+    bool goes_on;                 /* tiles_goes_on */
     kept_plan kept[KEPT_PLANS];
     int next; /* place of the plan that goes next */
 };
@@ -65,8 +66,8 @@ void tiles_add_attribution(const store_terrain *t, struct cJSON *document);
 void tiles_add_bounds(const store_terrain *t, double most_latitude, struct cJSON *document);
 /* The document's text as the answer; releases it and the JSON. */
 int tiles_print(struct cJSON *document, tile_bytes *out);
-/* Has the mesh of eps a triangle in a region? Looks no further than the first. */
-int tiles_has_triangle(tiles *t, const rqt_region *region, double eps, const store_query_options *options,
+/* Has the mesh of eps a triangle in a box of samples (west, east, north, south; cut at the raster's end)? */
+int tiles_has_triangle(tiles *t, const int32_t box[4], double eps, const store_query_options *options,
                        bool *is_there, char **error);
 /* Ranges as they are found; items are to be released with sqlite3_free. */
 typedef struct range_list {

@@ -125,21 +125,17 @@ int tiles_print(cJSON *document, tile_bytes *out) {
     return out->bytes ? SQLITE_OK : SQLITE_NOMEM;
 }
 
-int tiles_has_triangle(tiles *t, const rqt_region *region, double eps, const store_query_options *options,
+int tiles_has_triangle(tiles *t, const int32_t box[4], double eps, const store_query_options *options,
                        bool *is_there, char **error) {
-    store_limits *limits = store_limits_of(t->store);
-    const int64_t before = limits->triangles;
-    rqt_patch patch = {0};
-    limits->triangles = 1; /* more is not looked for */
-    int code = store_query(t->store, t->terrain, region, eps, options, &patch, NULL, error);
-    limits->triangles = before;
-    *is_there = code == SQLITE_TOOBIG || patch.triangle_count > 0;
-    if (code == SQLITE_TOOBIG) {
-        sqlite3_free(*error);
-        *error = NULL;
-        code = SQLITE_OK;
-    }
-    store_keep(t->store, &patch);
+    const rqt_vertex from = {box[0], box[2]},
+                     to = rqt_vertex_clamp(&t->terrain->lattice, (rqt_vertex){box[1], box[3]});
+    const int64_t unit = INT64_C(1) << 20, x[2] = {from.x * unit, to.x * unit}, y[2] = {from.y * unit, to.y * unit};
+    uint8_t mark = 0;
+    rqt_cells cell = {x, y, 1, 1, &mark};
+    rqt_block_number last = 0;
+    const bool has_area = from.x < to.x && from.y < to.y;
+    const int code = has_area ? store_mark(t->store, t->terrain, eps, options, &cell, &last, error) : SQLITE_OK;
+    *is_there = mark;
     return code;
 }
 
@@ -211,6 +207,7 @@ int tiles_begin(tiles *t, const tile_kind *kind, const char *terrain, char **err
     if (code != SQLITE_OK) return code;
     t->kind = kind;
     t->last = TILES_LEVELS;
+    t->goes_on = false;
     code = store_find(t->store, terrain, &t->terrain, error);
     if (code == SQLITE_OK) code = find_plan(t, error);
     if (code != SQLITE_OK) tiles_end(t);
@@ -228,6 +225,10 @@ void tiles_tell(tiles *t, int last) {
     t->last = last;
 }
 
+bool tiles_goes_on(const tiles *t) {
+    return t->goes_on;
+}
+
 int tiles_finest(const tiles *t) {
     return t->kind->functions->finest(t);
 }
@@ -235,6 +236,7 @@ int tiles_finest(const tiles *t) {
 int tiles_available(tiles *t, int series, int z, const tile_range **ranges, size_t *count, char **error) {
     *ranges = NULL;
     *count = 0;
+    t->goes_on = false;
     if (z < 0 || z > tiles_finest(t)) return SQLITE_OK;
     return t->kind->functions->available(t, series, z, ranges, count, error);
 }
@@ -242,11 +244,13 @@ int tiles_available(tiles *t, int series, int z, const tile_range **ranges, size
 int tiles_document(tiles *t, const char *root, int first, int last, tile_bytes *out, char **error) {
     const int finest = tiles_finest(t);
     *out = (tile_bytes){0};
+    t->goes_on = false;
     return t->kind->functions->document(t, root, first, last > finest ? finest : last, out, error);
 }
 
 int tiles_make(tiles *t, int series, int z, int32_t x, int32_t y, tile_bytes *out, char **error) {
     *out = (tile_bytes){0};
+    t->goes_on = false;
     if (z < 0 || z > tiles_finest(t) || x < 0 || y < 0) return SQLITE_OK;
     return t->kind->functions->make(t, series, z, x, y, out, error);
 }
