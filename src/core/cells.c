@@ -23,9 +23,13 @@ typedef struct marking {
     rqt_block_place place;
     rule_range range; /* of the block's vertices; least is most without a rule */
     uint8_t mask;     /* flags that select */
-    bool clamped;     /* some of them are past the last sample */
     rqt_cells *cells;
 } marking;
+
+/* A coordinate as the raster's end clamps it. */
+static int32_t cut_at(int32_t at, int32_t samples) {
+    return at < samples ? at : samples - 1;
+}
 
 /* Those of a span that have inner points in a box of samples. */
 static span narrow(const rqt_cells *cells, span s, int32_t x0, int32_t x1, int32_t y0, int32_t y1) {
@@ -80,11 +84,6 @@ static int32_t most_of(int32_t a, int32_t b, int32_t c) {
     return most > c ? most : c;
 }
 
-static span narrow_to_triangle(const rqt_cells *cells, span s, const rqt_vertex v[3]) {
-    return narrow(cells, s, least_of(v[0].x, v[1].x, v[2].x), most_of(v[0].x, v[1].x, v[2].x),
-                  least_of(v[0].y, v[1].y, v[2].y), most_of(v[0].y, v[1].y, v[2].y));
-}
-
 /* Is all of a cell on the outer side of the edge from p to q, or on it? turn: +1 where the triangle lies on the
  * side of positive products, -1 on the other. An edge is at most 2^RQT_MAX_K samples in each coordinate, a cell at
  * most 2^(RQT_MAX_K + 20) units away: both products are below 2^61. */
@@ -104,7 +103,8 @@ static void mark_leaf(const marking *m, const mark_corner *a, const mark_corner 
         (int64_t)(v[1].x - v[0].x) * (v[2].y - v[0].y) - (int64_t)(v[2].x - v[0].x) * (v[1].y - v[0].y);
     if (area == 0) return;
     const int turn = area > 0 ? 1 : -1;
-    s = narrow_to_triangle(m->cells, s, v);
+    s = narrow(m->cells, s, least_of(v[0].x, v[1].x, v[2].x), most_of(v[0].x, v[1].x, v[2].x),
+               least_of(v[0].y, v[1].y, v[2].y), most_of(v[0].y, v[1].y, v[2].y));
     for (int32_t y = s.y0; y < s.y1; y++)
         for (int32_t x = s.x0; x < s.x1; x++) {
             uint8_t *mark = mark_of(m->cells, x, y);
@@ -153,23 +153,24 @@ static mark_corner corner_at(const marking *m, step at) {
 
 /* Does a triangle lie in one cell, so that its leaves can be asked for no more than whether they are kept? Where
  * the raster's end clamps it they may have no area. */
-static bool is_within(const marking *m, span s, const rqt_vertex v[3]) {
+static bool is_within(const marking *m, span s, int32_t x0, int32_t x1, int32_t y0, int32_t y1) {
     const int64_t one = INT64_C(1) << UNIT;
+    const rqt_lattice *lattice = &m->query->lattice;
     const rqt_cells *cells = m->cells;
-    return !m->clamped && s.x1 - s.x0 == 1 && s.y1 - s.y0 == 1 &&
-           least_of(v[0].x, v[1].x, v[2].x) * one >= cells->x[s.x0] &&
-           most_of(v[0].x, v[1].x, v[2].x) * one <= cells->x[s.x1] &&
-           least_of(v[0].y, v[1].y, v[2].y) * one >= cells->y[s.y0] &&
-           most_of(v[0].y, v[1].y, v[2].y) * one <= cells->y[s.y1];
+    return s.x1 - s.x0 == 1 && s.y1 - s.y0 == 1 && x1 < lattice->width && y1 < lattice->height &&
+           x0 * one >= cells->x[s.x0] && x1 * one <= cells->x[s.x1] && y0 * one >= cells->y[s.y0] &&
+           y1 * one <= cells->y[s.y1];
 }
 
 static void mark_below(const marking *m, step a, step l, step r, int splits, span s) {
     const rqt_lattice *lattice = &m->query->lattice;
-    const rqt_vertex v[3] = {rqt_vertex_clamp(lattice, vertex_at(m, a)), rqt_vertex_clamp(lattice, vertex_at(m, l)),
-                             rqt_vertex_clamp(lattice, vertex_at(m, r))};
-    s = narrow_to_triangle(m->cells, s, v);
+    const rqt_block_place *p = &m->place;
+    const int32_t x0 = p->x + least_of(a.u, l.u, r.u) * p->stride, x1 = p->x + most_of(a.u, l.u, r.u) * p->stride,
+                  y0 = p->y + least_of(a.v, l.v, r.v) * p->stride, y1 = p->y + most_of(a.v, l.v, r.v) * p->stride;
+    s = narrow(m->cells, s, cut_at(x0, lattice->width), cut_at(x1, lattice->width), cut_at(y0, lattice->height),
+               cut_at(y1, lattice->height));
     if (!lacks(m->cells, s)) return;
-    if (is_within(m, s, v)) {
+    if (is_within(m, s, x0, x1, y0, y1)) {
         if (keeps_any(m, place_of(m, a), place_of(m, l), place_of(m, r), splits))
             *mark_of(m->cells, s.x0, s.y0) = 1;
         return;
@@ -219,7 +220,6 @@ void rqt_query_mark(const rqt_query *query, const rqt_answer *answer, const rqt_
     const rqt_block_place *p = &m.place;
     const span all = {0, cells->columns, 0, cells->rows};
     m.range = range_of(query, p);
-    m.clamped = p->x + p->side >= query->lattice.width || p->y + p->side >= query->lattice.height;
     /* query.c has the same cases. */
     const int c = (p->i & 1) | (p->j & 1) << 1, from = p->level == 0 ? 0 : c, to = 3 - from;
     for (int h = 0; h < 2; h++) {

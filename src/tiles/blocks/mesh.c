@@ -78,10 +78,11 @@ static int query(tiles *t, block_tile tile, rqt_patch *patch, char **error) {
 int block_has_triangle(tiles *t, block_tile tile, bool *has, char **error) {
     const int32_t side = 1 << (t->terrain->lattice.K - tile.level), x = tile.i * side, y = tile.j * side;
     const int32_t box[4] = {x, x + side, y, y + side};
+    rqt_block_number last = 0;
     cell_query q;
     int code = begin_query(t, tile, &q);
     if (code == SQLITE_OK)
-        code = tiles_has_triangle(t, box, block_plan_of(t)->level[tile.level].error, &q.options, has, error);
+        code = tiles_has_triangle(t, box, block_plan_of(t)->level[tile.level].error, &q.options, &last, has, error);
     end_query(&q);
     return code;
 }

@@ -186,7 +186,7 @@ static int find_tiles(tiles *t, int z, range_list *list, char **error) {
     } else {
         code = search(t, z, *s, error);
     }
-    if (code == SQLITE_INTERRUPT) {
+    if ((code & 0xFF) == SQLITE_INTERRUPT) {
         t->goes_on = true;
         return code;
     }

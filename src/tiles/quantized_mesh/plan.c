@@ -110,18 +110,24 @@ static int keep_ground(tiles *t, char **error) {
     const int32_t all[4] = {0, t->terrain->lattice.width - 1, 0, t->terrain->lattice.height - 1};
     const store_query_options options = plan_options(t, 0);
     bool is_there = false;
-    double most = plan->level[0].eps;
-    if (t->terrain->voids == 0) return SQLITE_OK;
-    int code = tiles_has_triangle(t, all, most, &options, &is_there, error);
-    while (code == SQLITE_OK && !is_there && most > cell / 2) { /* finer outlines have no more */
-        most /= 2;
-        code = tiles_has_triangle(t, all, most, &options, &is_there, error);
+    if (t->terrain->voids == 0 || plan->ground.is_known) return SQLITE_OK;
+    if (plan->ground.eps == 0) plan->ground.eps = plan->level[0].eps;
+    for (;;) {
+        const int code =
+            tiles_has_triangle(t, all, plan->ground.eps, &options, &plan->ground.last, &is_there, error);
+        if (code != SQLITE_OK) return code;
+        if (is_there || plan->ground.eps <= cell / 2) break; /* finer outlines have no more */
+        plan->ground.eps /= 2;
+        plan->ground.last = 0;
     }
-    for (int z = 0; z <= plan->finest && is_there; z++) plan->level[z].eps = fmin(plan->level[z].eps, most);
-    return code;
+    for (int z = 0; z <= plan->finest && is_there; z++)
+        plan->level[z].eps = fmin(plan->level[z].eps, plan->ground.eps);
+    plan->ground.is_known = true;
+    return SQLITE_OK;
 }
 
-int plan_create(tiles *t, void **out, char **error) {
+/* What takes no time. */
+static int begin_plan(tiles *t, tile_plan **out, char **error) {
     const store_terrain *terrain = t->terrain;
     bool is_above_geoid;
     int code = tiles_check_place(terrain, error);
@@ -136,15 +142,27 @@ int plan_create(tiles *t, void **out, char **error) {
     if (code == SQLITE_OK) {
         set_heights(terrain, plan);
         code = set_levels(terrain, plan, error);
-        if (code == SQLITE_OK) code = keep_ground(t, error);
     }
-    if (code == SQLITE_OK) code = seam_close(t, error);
     if (code == SQLITE_OK) code = water_read(t, plan, error);
     t->plan = NULL;
     if (code != SQLITE_OK)
         plan_free(plan);
     else
         *out = plan;
+    return code;
+}
+
+int plan_create(tiles *t, void **out, char **error) {
+    tile_plan *plan = *out;
+    int code = plan ? SQLITE_OK : begin_plan(t, &plan, error);
+    if (code != SQLITE_OK) return code;
+    t->plan = *out = plan;
+    code = keep_ground(t, error);
+    if (code == SQLITE_OK) code = seam_close(t, error);
+    t->plan = NULL;
+    if (code == SQLITE_OK || (code & 0xFF) == SQLITE_INTERRUPT) return code;
+    plan_free(plan);
+    *out = NULL;
     return code;
 }
 

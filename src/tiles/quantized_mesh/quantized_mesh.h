@@ -25,6 +25,13 @@ typedef struct tile_level {
 } tile_level;
 
 typedef struct layer_search layer_search;
+/* What is known of the largest eps that leaves a triangle (plan.c). */
+typedef struct tile_ground {
+    double eps;            /* the one that is asked for; 0: none yet */
+    rqt_block_number last; /* of store_mark */
+    bool is_known;
+} tile_ground;
+
 typedef struct sea_run {
     int32_t row, first, last;
 } sea_run;
@@ -33,6 +40,7 @@ typedef struct sea_run {
 typedef struct tile_plan {
     int finest;
     tile_level level[TILES_LEVELS];
+    tile_ground ground;
     double lowest, step; /* a height n is lowest + n * step metres, 0 <= n <= TILE_UNITS; step a power of two */
     double radius;       /* no radius of curvature, and height above it, is larger: metres */
     double rounded;      /* the terrain's quantum_error */
@@ -91,7 +99,7 @@ int plan_rule(const tiles *t, rqt_rule **rule, char **error);
 
 /* Are the terrain's first and last columns one? Fills the plan's seam and merging. */
 int seam_read(tiles *t, char **error);
-/* If so: gives levels rules of their own. */
+/* If so: gives levels rules of their own, those that have none yet. */
 int seam_close(tiles *t, char **error);
 /* ... gives vertices of the last column the heights of the first; by how much samples of either may be off by that:
  * metres. */
