@@ -778,4 +778,24 @@ s.equal("the service lives", (server.is_alive(), server.ask("/healthz").status),
 server.process.terminate()
 s.equal("... and ends well", server.process.wait(30), 0)
 
+# A fiftieth of a second is too short to look at 900 x 900 samples without a triangle, but not for a part of them.
+bare = s.temp("bare.gpkg")
+s.import_terrain(bare, s.write_grid(s.temp("bare.asc"), [[None if (row + col) % 2 else 100 + row % 7 * col % 5 for col in range(900)] for row in range(900)], 12.3, 45.6, 1 / 1200, s.WGS84),
+                 name="bare")
+server = service.Service(bare, "--max-seconds", "0.02", "--workers", "1")
+told = []
+
+
+def is_answered():
+    told.append(server.ask("/collections/bare/tiles/quantized-mesh/layer.json"))
+    return told[-1].status != 503
+
+
+s.check("who asks again for what takes too long is answered", service.wait_until(is_answered) and told[-1].status == 200, told[-1].body[:200])
+s.check("... and was told to", any("ask again, and it goes on from here" in answer.detail() and answer.retry_after == "1" for answer in told[:-1]), [a.body[:200] for a in told[:3]])
+s.run([s.RQT, "tiles", bare, "-o", s.temp("bare")])
+s.equal("... with the same", told[-1].body, open(s.temp("bare") + "/layer.json", "rb").read())
+server.process.terminate()
+s.equal("... and the service ends well", server.process.wait(30), 0)
+
 s.finish()

@@ -151,15 +151,12 @@ static mark_corner corner_at(const marking *m, step at) {
     return (mark_corner){vertex_at(m, at), m->block->flags[place_of(m, at)]};
 }
 
-/* Does a triangle lie in one cell, so that its leaves can be asked for no more than whether they are kept? Where
- * the raster's end clamps it they may have no area. */
-static bool is_within(const marking *m, span s, int32_t x0, int32_t x1, int32_t y0, int32_t y1) {
+/* Does a triangle lie in one cell, so that its leaves can be asked for no more than whether they are kept? Cells
+ * end with the raster: it is not clamped then. */
+static bool is_within(const rqt_cells *cells, span s, int32_t x0, int32_t x1, int32_t y0, int32_t y1) {
     const int64_t one = INT64_C(1) << UNIT;
-    const rqt_lattice *lattice = &m->query->lattice;
-    const rqt_cells *cells = m->cells;
-    return s.x1 - s.x0 == 1 && s.y1 - s.y0 == 1 && x1 < lattice->width && y1 < lattice->height &&
-           x0 * one >= cells->x[s.x0] && x1 * one <= cells->x[s.x1] && y0 * one >= cells->y[s.y0] &&
-           y1 * one <= cells->y[s.y1];
+    return s.x1 - s.x0 == 1 && s.y1 - s.y0 == 1 && x0 * one >= cells->x[s.x0] && x1 * one <= cells->x[s.x1] &&
+           y0 * one >= cells->y[s.y0] && y1 * one <= cells->y[s.y1];
 }
 
 static void mark_below(const marking *m, step a, step l, step r, int splits, span s) {
@@ -170,7 +167,7 @@ static void mark_below(const marking *m, step a, step l, step r, int splits, spa
     s = narrow(m->cells, s, cut_at(x0, lattice->width), cut_at(x1, lattice->width), cut_at(y0, lattice->height),
                cut_at(y1, lattice->height));
     if (!lacks(m->cells, s)) return;
-    if (is_within(m, s, x0, x1, y0, y1)) {
+    if (is_within(m->cells, s, x0, x1, y0, y1)) {
         if (keeps_any(m, place_of(m, a), place_of(m, l), place_of(m, r), splits))
             *mark_of(m->cells, s.x0, s.y0) = 1;
         return;

@@ -310,22 +310,19 @@ typedef struct covered {
     bool all, nothing;
 } covered;
 
-/* Leaves over the cell of a block that answers have selected vertices of the block or its corners for their own,
- * and perhaps one of the two vertices outside of it that its summary has (core/query.c). When all of those are
- * valid, all leaves are kept, and the mesh has no gap over the cell as far as there are samples; when all of the
- * block are void no leaf is kept, for each has two corners of it at least. */
-static int cover_of(store *s, const store_terrain *t, const rqt_answer *answer, covered *cover, char **error) {
+/* Where a vertex inside the cell of a block is selected its centre is, and both corners in the middle of sides of
+ * its parent, on which the centre depends: so all leaves over the cell have vertices of the block for their corners
+ * (core/query.c). When none of them is void all leaves are kept, and the mesh has no gap there as far as there are
+ * samples; when all are no leaf is. */
+static int cover_of(store *s, const store_terrain *t, rqt_block_number number, covered *cover, char **error) {
     const uint8_t *bytes;
     int size;
     rqt_block_header header = {0};
-    int code = store_block_bytes(s, t, answer->number, &bytes, &size, error);
+    int code = store_block_bytes(s, t, number, &bytes, &size, error);
     if (code == SQLITE_OK && rqt_block_info(bytes, (size_t)size, &header, NULL) != RQT_OK)
-        code = store_fail(error, SQLITE_CORRUPT_VTAB, "terrain %s is damaged: block %llu", t->name, answer->number);
+        code = store_fail(error, SQLITE_CORRUPT_VTAB, "terrain %s is damaged: block %llu", t->name, number);
     sqlite3_reset(store_statements(s, t)->bytes);
-    uint8_t all = RQT_VALID;
-    for (int i = 0; i < 2 && answer->number > 1; i++) all &= answer->summary.far[i].flags;
-    cover->nothing = header.all_void;
-    cover->all = !header.has_voids && !header.all_void && all;
+    *cover = (covered){.all = !header.has_voids && !header.all_void, .nothing = header.all_void};
     return code;
 }
 
@@ -339,7 +336,7 @@ static int mark_answer(store *s, const store_terrain *t, const rqt_query *query,
     if (!rqt_cells_lack(cells, &t->lattice, &place)) return SQLITE_OK;
     if (rqt_query_selects_inside(query, answer)) {
         if (store_is_interrupted(s, &code)) return code;
-        code = cover_of(s, t, answer, &cover, error);
+        code = cover_of(s, t, answer->number, &cover, error);
         if (code == SQLITE_OK && !cover.all && !cover.nothing)
             code = store_get_block(s, t, answer->number, &block, &read, error);
     }
