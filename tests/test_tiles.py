@@ -749,6 +749,23 @@ db.execute("PRAGMA journal_mode = WAL")
 db.close()
 for name in ("tiles of a database with a log", "... are gone on with by the same command"):
     s.equal(name, s.run([s.RQT, "tiles", logged, "-o", s.temp("logged")]), ("", 0))
+# What changes the file and not the terrain: other tables, the log's end, VACUUM, a copy.
+db = s.connect(logged, load=False)
+db.execute("CREATE TABLE other AS SELECT 1 AS x")
+for name, sql in (("beside another table", "SELECT 1"), ("after a checkpoint", "PRAGMA wal_checkpoint(TRUNCATE)"), ("after VACUUM", "VACUUM")):
+    db.execute(sql).fetchall()
+    s.equal("... " + name, s.run([s.RQT, "tiles", logged, "-o", s.temp("logged")]), ("", 0))
+db.close()
+shutil.copy(logged, s.temp("copied.gpkg"))
+s.equal("... by a copy", s.run([s.RQT, "tiles", s.temp("copied.gpkg"), "-o", s.temp("logged")]), ("", 0))
+for name, sql in (("row", "UPDATE rqt_terrain SET source = 'elsewhere'"), ("summary", "UPDATE rqt_block_1 SET summary = (SELECT summary FROM rqt_block_1 WHERE id = 2) WHERE id = 1"),
+                  ("block", "UPDATE rqt_block_1 SET data = (SELECT data FROM rqt_block_1 WHERE id = 2) WHERE id = 1"), ("sea", "UPDATE rqt_fill_1 SET col0 = col0 + 1 WHERE id = 1")):
+    shutil.copy(logged, s.temp("changed.gpkg"))
+    db = s.connect(s.temp("changed.gpkg"), load=False)
+    db.execute(sql)
+    db.close()
+    out, status = s.run([s.RQT, "tiles", s.temp("changed.gpkg"), "-o", s.temp("logged")])
+    s.check("... not with another " + name, status == 1 and "of another state of it" in out, out)
 
 # --------------------------------------------------------------------------------------------------------- the service
 

@@ -181,6 +181,10 @@ typedef struct store_finding {
 int store_check(store *s, const store_terrain *t, bool (*tell)(void *context, const store_finding *finding),
                 void *context, char **error);
 
+/* A number that two states of a terrain have in common when all that is stored of it is the same, and, as numbers
+ * of 64 bits go, only then. Reads a page of each block. */
+int store_digest(store *s, const store_terrain *t, uint64_t *digest, char **error);
+
 /* How many samples of the terrain were no data: [0] STORE_FILLED, [1] STORE_SEA. */
 int store_fill_counts(store *s, const store_terrain *t, int64_t counts[2], char **error);
 

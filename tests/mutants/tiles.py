@@ -70,6 +70,8 @@ MUTANTS = [
     ("tiles: all is made again", PYRAMID, "if (lstat(path, &there) == 0 && S_ISREG(there.st_mode) && there.st_size > 0) return SQLITE_OK;", "(void)there;", TILES, "without making again"),
     ("tiles: anybody's folder will do", PYRAMID, "if ((size_t)n == size && memcmp(there, description, size) == 0) return SQLITE_OK;", "return SQLITE_OK;", TILES, "are not mixed in"),
     ("tiles: what nobody says anything of is ours", PYRAMID, "if (n == 0) code = check_empty(job->folder, error);", "if (n < 0) code = check_empty(job->folder, error);", TILES, "says nothing of its files"),
+    ("digest: blocks are alike", "src/store/digest.c", "if (code == SQLITE_OK) *h = mix(mix(*h, &size, sizeof size), header, (size_t)n);", "", TILES, "another block"),
+    ("digest: nothing was filled", "src/store/digest.c", "store_has_fill(s->db, t))", "!s)", TILES, "another sea"),
     ("tiles: two commands write into one folder", PYRAMID, "if (flock(*file, LOCK_EX | LOCK_NB))", "if (flock(*file, LOCK_UN))", TILES, "by one command at a time"),
     ("tiles: gzip is not asked for", PYRAMID, "if (p->job->gzip && !series->is_packed) code = pack(&tile);", "", TILES, "all tiles are compressed"),
     ("tiles: numbers of paths may begin with 0", "src/serve/endpoints.c", "|| (digits > 1 && *segment == '0')", "", TILES, "no tile at 00/1/0"),
