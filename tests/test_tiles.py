@@ -758,8 +758,8 @@ for name, sql in (("beside another table", "SELECT 1"), ("after a checkpoint", "
 db.close()
 shutil.copy(logged, s.temp("copied.gpkg"))
 s.equal("... by a copy", s.run([s.RQT, "tiles", s.temp("copied.gpkg"), "-o", s.temp("logged")]), ("", 0))
-for name, sql in (("row", "UPDATE rqt_terrain SET source = 'elsewhere'"), ("summary", "UPDATE rqt_block_1 SET summary = (SELECT summary FROM rqt_block_1 WHERE id = 2) WHERE id = 1"),
-                  ("block", "UPDATE rqt_block_1 SET data = (SELECT data FROM rqt_block_1 WHERE id = 2) WHERE id = 1"), ("sea", "UPDATE rqt_fill_1 SET col0 = col0 + 1 WHERE id = 1")):
+for name, sql in (("row", "UPDATE rqt_terrain SET source = 'elsewhere'"), ("summary", "UPDATE rqt_block_1 SET summary = (SELECT summary FROM rqt_block_1 WHERE id > 1) WHERE id = 1"),
+                  ("block", "UPDATE rqt_block_1 SET data = (SELECT data FROM rqt_block_1 WHERE id > 1) WHERE id = 1"), ("sea", "UPDATE rqt_fill_1 SET col0 = col0 + 1 WHERE id = 1")):
     shutil.copy(logged, s.temp("changed.gpkg"))
     db = s.connect(s.temp("changed.gpkg"), load=False)
     db.execute(sql)
