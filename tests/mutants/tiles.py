@@ -60,7 +60,7 @@ MUTANTS = [
     ("tiles: nothing is kept of a search", LAYER, "t->goes_on = true;\n        return code;", "t->goes_on = true;\n        layer_search_free(*s);\n        *s = NULL;\n        return code;", "test_tiles_search",
      "the_same_time_again_and_again_is_enough"),
     ("tiles: nothing is kept of a plan", COMMON, "else if (kept->plan)\n        t->goes_on = true;", "else if (!kept)\n        t->goes_on = true;", "test_tiles_search", "the_same_time_again_and_again_is_enough"),
-    ("tiles: all tiles know of those below", "src/tiles/quantized_mesh/encode.c", "if (place->z == 0) {", "if (place->z <= 4) {", "test_tiles_search", "other_tiles_do_not_wait_for_it"),
+    ("tiles: all tiles know of those below", "src/tiles/quantized_mesh/encode.c", "if (place->z == 0) {", "if (place->z >= 0) {", "test_tiles_search", "other_tiles_do_not_wait_for_it"),
     ("rules: rows of a block have the ranks of its first", "src/core/walk.c", "threshold[__builtin_ctz(v | (n - 1))]", "threshold[0]", "test_core_rule", "eps_lowered_by_rank_alone_is_its_definition"),
     ("normals: a row's metres are those of another", "src/store/normals.c", "if (k->row != row) {", "if (k->row < 0) {", "test_sql_normals.py", "normal"),
     ("tiles: longitudes count once", PLAN, "(int)ceil((e.east + 180) / 360)};", "0};", TILES, "358.5"),
