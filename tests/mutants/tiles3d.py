@@ -32,7 +32,7 @@ MUTANTS = [
     # availability
     ("3d-tiles: every tile has content", TILE, "return relief->is_mixed ? block_has_triangle(t, tile, has, error) : SQLITE_OK;", "const int code = relief->is_mixed ? block_has_triangle(t, tile, has, error) : SQLITE_OK;\n    *has = true;\n    return code;", TILES, "holes"),
     ("3d-tiles: no mixed tile has content", TILE, "return relief->is_mixed ? block_has_triangle(t, tile, has, error) : SQLITE_OK;", "const int code = relief->is_mixed ? block_has_triangle(t, tile, has, error) : SQLITE_OK;\n    *has = *has && !relief->is_mixed;\n    return code;", TILES, "holes"),
-    ("3d-tiles: blocks without voids have nothing", MESH, "*has = cover == STORE_COVER_ALL;", "*has = cover == STORE_COVER_NOTHING;", TILES, "lone: a void"),
+    ("3d-tiles: blocks without voids have nothing", "src/store/query.c", ".all = !header.has_voids", ".all = header.has_voids", TILES, "holes: subtrees and tiles"),
     ("3d-tiles: a cell without an outline is all valid", RELIEF, "relief->is_valid = summary->corner[0].flags & RQT_VALID;", "relief->is_valid = true;", TILES, "holes"),
     ("3d-tiles: bits are counted from the other end", SUBTREE, "(uint8_t)(1 << i % 8)", "(uint8_t)(128 >> i % 8)", TILES, "as the formats have them"),
     ("3d-tiles: x and y change places", SUBTREE, "x |= (m >> 2 * bit & 1) << bit;", "x |= (m >> (2 * bit + 1) & 1) << bit;", TILES, "as the formats have them"),

@@ -67,7 +67,7 @@ void block_region(const tiles *t, block_tile tile, const store_relief *relief, d
  * east across the antimeridian. */
 void block_rectangle(double west, double south, double east, double north, double region[4]);
 
-/* Has the mesh of a tile a triangle? By the blocks that answer, and if they do not say, up to the first one. */
+/* Has the mesh of a tile a triangle? By the blocks that answer. */
 int block_has_triangle(tiles *t, block_tile tile, bool *has, char **error);
 
 typedef struct block_mesh {
