@@ -365,6 +365,7 @@ static void ask(input *in, const fuzz_terrain *t, pyramid *p, const ruling *r, c
         if (ok && select == 0) {
             clip(&patch, region, l, a, h);
             profile(in, &patch, l, a, h);
+            look_at_marks(in, p, &query, &patch);
         }
         rqt_patch_free(&patch);
         free(query.answers);
