@@ -1,5 +1,5 @@
-/* leaves.c - pixels of the levels that have pixels larger than samples: on a mesh whose vertices are
- * about as far apart as pixels. proof.c tells how far it is from what is drawn.
+/* leaves.c - pixels of the levels that have pixels larger than samples: on a mesh whose vertices are about as far
+ * apart as pixels. proof.c tells how far it is from what is drawn.
  *
  * Blocks of one level of the pyramid tile the terrain. Each, of stride s, keeps the vertices of its lattice whose
  * error is above its em, and those of the outline, which with its corners are a closed set; no vertex finer than s
