@@ -65,6 +65,8 @@ void tiles_add_attribution(const store_terrain *t, struct cJSON *document);
 void tiles_add_bounds(const store_terrain *t, double most_latitude, struct cJSON *document);
 /* The document's text as the answer; releases it and the JSON. */
 int tiles_print(struct cJSON *document, tile_bytes *out);
+/* The union of boxes of samples: x0, x1, y0, y1 of each. */
+int tiles_region(const tiles *t, const double (*boxes)[4], int count, rqt_region **region);
 /* Has the mesh of eps a triangle in a region? Looks no further than the first. */
 int tiles_has_triangle(tiles *t, const rqt_region *region, double eps, const store_query_options *options,
                        bool *is_there, char **error);

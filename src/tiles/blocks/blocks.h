@@ -4,6 +4,7 @@
  *   plan.c     levels and their tolerances, steps of positions
  *   tile.c     one tile by the index alone: is it there, what is it off, where does it lie
  *   mesh.c     the terrain's mesh of a cell, in space
+ *   normals.c  its normals
  *   glb.c      the same as glTF
  *   subtree.c  availability and metadata of some levels of tiles
  *   tileset.c  the kind; tileset.json
@@ -21,6 +22,7 @@ typedef struct block_level {
     double centre; /* what curvature takes from the two triangles that a cell is at least made of */
     double step;   /* positions are whole ones: a power of two */
     double round;  /* what rounding moves a vertex by, at most */
+    rqt_rule *rule; /* its mesh, in the cells that were asked for; NULL: none was */
 } block_level;
 
 /* What all tiles of a terrain have in common. */
@@ -47,6 +49,11 @@ typedef struct block_tile {
     int32_t i, j; /* the block's cell: from the west, from the north */
 } block_tile;
 block_tile block_tile_of(int level, int32_t x, int32_t y);
+/* Its samples, as far as there are any. */
+typedef struct block_cell {
+    rqt_vertex from, to; /* both are in it */
+} block_cell;
+block_cell block_cell_of(const tiles *t, block_tile tile);
 /* Is its block stored? */
 bool block_exists(const tiles *t, block_tile tile);
 /* What the index knows of a tile, given what it knows of the one above; of the whole terrain, for the root's. */
@@ -77,6 +84,13 @@ typedef struct block_mesh {
 /* Without a triangle where the tile has no content. */
 int block_mesh_make(tiles *t, block_tile tile, block_mesh *mesh, char **error);
 void block_mesh_free(tiles *t, block_mesh *mesh);
+/* The triangles of the level's mesh that are not the tile's, but have a vertex with it in common; and others. */
+int block_mesh_around(tiles *t, block_tile tile, rqt_patch *patch, char **error);
+/* Places of a level's vertices, as a block_mesh has them; origin: chosen here, unless it has one. */
+int block_places(const tiles *t, const rqt_patch *patch, double step, double *origin, bool has_origin,
+                 int32_t **offset, char **error);
+/* The mesh has all else. */
+int block_normals(tiles *t, block_tile tile, block_mesh *mesh, char **error);
 
 int block_glb_make(tiles *t, block_tile tile, const block_mesh *mesh, tile_bytes *out, char **error);
 /* The subtree whose root is the tile, which exists. */

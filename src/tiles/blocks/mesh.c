@@ -1,10 +1,11 @@
 /* mesh.c - the mesh of a tile: the terrain's own at the level's error, in the cell of a block, its corners
- * forced. And its vertices in space.
+ * forced. And its vertices in space. Normals: normals.c.
  *
  * The rule is lowered by rank by what curvature takes; a rank of which curvature takes more than the level has to
  * give, is in whatever its errors. On the last level only that is lowered: else what has any error is in. The cell
- * is a square of the lattice, so that nothing is cut: every vertex is a sample, and its place, step and normal
- * depend on the sample and the level alone. That is all that there is to seams.
+ * is a square of the lattice, so that nothing is cut: every vertex is a sample, and its place and step
+ * depend on the sample and the level alone. That is all that there is to seams. What the corners of a cell bring
+ * along are corners of cells: so a level has one rule, in which those are forced that are asked for.
  *
  * At a pole a row of samples is one place, at the antimeridian the first and the last column may be: both are
  * rounded to the same steps, but for one that lies on the very edge between two; sines and cosines are off by 1e-9
@@ -14,99 +15,113 @@
 #include "earth.h"
 
 #include <math.h>
+#include <string.h>
 
 #define BEYOND_POLE (90 * (1 + 1e-9)) /* a row at a pole, by a rounding */
-enum { NORMAL_UNITS = 127 };
 enum { CORNER = 16 }; /* of a side, one part */
+#define RIM 0.5       /* samples: any triangle at a side meets it */
 
 /* ---------------------------------------------------------------------------------------------------- mesh -- */
 
-static int make_rule(const tiles *t, block_tile tile, rqt_rule **rule) {
+static int make_rule(const tiles *t, int l, rqt_rule **rule) {
     const block_plan *plan = block_plan_of(t);
     const store_terrain *terrain = t->terrain;
-    const double error = plan->level[tile.level].error;
-    const int32_t side = 1 << (terrain->lattice.K - tile.level);
+    const double error = plan->level[l].error;
     double lowering[RQT_RANKS];
     for (int rank = 0; rank < RQT_RANKS; rank++) {
         const double sag = block_sag(plan, rank);
         const bool is_free = sag + terrain->quantum_error <= error;
-        lowering[rank] = !is_free ? 2 * error + 1 : tile.level == plan->finest ? error : sag;
+        lowering[rank] = !is_free ? 2 * error + 1 : l == plan->finest ? error : sag;
     }
     rqt_status status = rqt_rule_create(&terrain->lattice, terrain->quantum_error, store_allocator(), rule);
     if (status == RQT_OK) status = rqt_rule_set_lowering(*rule, lowering);
+    return status == RQT_OK ? SQLITE_OK : SQLITE_NOMEM;
+}
+
+static int force_corners(const tiles *t, block_tile cell, rqt_rule *rule) {
+    const int32_t side = 1 << (t->terrain->lattice.K - cell.level);
+    rqt_status status = RQT_OK;
     for (int corner = 0; corner < 4 && status == RQT_OK; corner++)
         status =
-            rqt_rule_force(*rule, (rqt_vertex){(tile.i + (corner & 1)) * side, (tile.j + (corner >> 1)) * side});
+            rqt_rule_force(rule, (rqt_vertex){(cell.i + (corner & 1)) * side, (cell.j + (corner >> 1)) * side});
     return status == RQT_OK ? SQLITE_OK : SQLITE_NOMEM;
 }
 
-/* What to ask for the mesh of the north-western corner of a cell, its side so large a part of the cell's. Released
- * by end_query, whatever came of it. */
-typedef struct cell_query {
-    rqt_region *region;
-    store_query_options options;
-} cell_query;
+/* *options: those of every query of a tile's level that asks for what lies in its cell. */
+static int begin_query(const tiles *t, block_tile tile, store_query_options *options) {
+    block_level *level = &block_plan_of(t)->level[tile.level];
+    const bool is_last = tile.level == block_plan_of(t)->finest;
+    int code = level->rule ? SQLITE_OK : make_rule(t, tile.level, &level->rule);
+    if (code == SQLITE_OK) code = force_corners(t, tile, level->rule);
+    *options = (store_query_options){.select = RQT_SELECT_THRESHOLD,
+                                     .outline = is_last ? RQT_OUTLINE_EXACT : RQT_OUTLINE_TOL,
+                                     .metric = RQT_METRIC_EXACT,
+                                     .product = RQT_PRODUCT_TRIANGLES,
+                                     .rule = level->rule};
+    return code;
+}
 
-static int begin_query(const tiles *t, block_tile tile, int32_t part, cell_query *q) {
+/* The north-western corner of a cell, its side so large a part of the cell's. */
+static int make_corner(const tiles *t, block_tile tile, int32_t part, rqt_region **region) {
     const int32_t side = 1 << (t->terrain->lattice.K - tile.level);
     const rqt_square square = {tile.i * side, tile.j * side, side / part};
-    const bool is_last = tile.level == block_plan_of(t)->finest;
-    *q = (cell_query){.options = {.select = RQT_SELECT_THRESHOLD,
-                                  .outline = is_last ? RQT_OUTLINE_EXACT : RQT_OUTLINE_TOL,
-                                  .metric = RQT_METRIC_EXACT,
-                                  .product = RQT_PRODUCT_TRIANGLES}};
-    const int code = make_rule(t, tile, &q->options.rule);
-    if (code != SQLITE_OK) return code;
-    const rqt_status status =
-        rqt_region_of_squares(&square, 1, &t->terrain->lattice, store_allocator(), &q->region);
+    const rqt_status status = rqt_region_of_squares(&square, 1, &t->terrain->lattice, store_allocator(), region);
     return status == RQT_OK ? SQLITE_OK : SQLITE_NOMEM;
 }
 
-static void end_query(cell_query *q) {
-    rqt_region_free(q->region);
-    rqt_rule_free(q->options.rule);
-}
-
-static int query(tiles *t, block_tile tile, rqt_patch *patch, char **error) {
-    cell_query q;
-    int code = begin_query(t, tile, 1, &q);
-    if (code == SQLITE_OK)
-        code = store_query(t->store, t->terrain, q.region, block_plan_of(t)->level[tile.level].error, &q.options,
-                           patch, NULL, error);
-    end_query(&q);
-    return code;
+static int query(tiles *t, block_tile tile, const rqt_region *region, rqt_patch *patch, char **error) {
+    store_query_options options;
+    const int code = begin_query(t, tile, &options);
+    return code != SQLITE_OK ? code
+                             : store_query(t->store, t->terrain, region, block_plan_of(t)->level[tile.level].error,
+                                           &options, patch, NULL, error);
 }
 
 /* A block is walked whole before it is asked whether that is enough: a corner takes less, and most have one. */
 static int probe(tiles *t, block_tile tile, bool *has, char **error) {
     int code = SQLITE_OK;
     for (int32_t part = CORNER; part > 0 && code == SQLITE_OK && !*has; part = part > 1 ? 1 : 0) {
-        cell_query q;
+        store_query_options options;
+        rqt_region *region = NULL;
         if (part > 1 << (t->terrain->lattice.K - tile.level)) continue;
-        code = begin_query(t, tile, part, &q);
+        code = begin_query(t, tile, &options);
+        if (code == SQLITE_OK) code = make_corner(t, tile, part, &region);
         if (code == SQLITE_OK)
-            code =
-                tiles_has_triangle(t, q.region, block_plan_of(t)->level[tile.level].error, &q.options, has, error);
-        end_query(&q);
+            code = tiles_has_triangle(t, region, block_plan_of(t)->level[tile.level].error, &options, has, error);
+        rqt_region_free(region);
     }
     return code;
 }
 
 int block_has_triangle(tiles *t, block_tile tile, bool *has, char **error) {
-    const rqt_lattice *lattice = &t->terrain->lattice;
-    const int32_t side = 1 << (lattice->K - tile.level);
-    const rqt_vertex from = {tile.i * side, tile.j * side},
-                     to = rqt_vertex_clamp(lattice, (rqt_vertex){from.x + side, from.y + side});
-    const int32_t box[4] = {from.x, to.x, from.y, to.y};
+    const block_cell cell = block_cell_of(t, tile);
+    const int32_t box[4] = {cell.from.x, cell.to.x, cell.from.y, cell.to.y};
     store_cover cover = STORE_COVER_UNKNOWN;
-    cell_query q;
-    int code = begin_query(t, tile, 1, &q);
+    store_query_options options;
+    int code = begin_query(t, tile, &options);
     if (code == SQLITE_OK)
-        code = store_covers(t->store, t->terrain, box, block_plan_of(t)->level[tile.level].error, &q.options,
-                            &cover, error);
-    end_query(&q);
+        code = store_covers(t->store, t->terrain, box, block_plan_of(t)->level[tile.level].error, &options, &cover,
+                            error);
     *has = cover == STORE_COVER_ALL;
     return code == SQLITE_OK && cover == STORE_COVER_UNKNOWN ? probe(t, tile, has, error) : code;
+}
+
+int block_mesh_around(tiles *t, block_tile tile, rqt_patch *patch, char **error) {
+    const block_cell cell = block_cell_of(t, tile);
+    const double x0 = cell.from.x, x1 = cell.to.x, y0 = cell.from.y, y1 = cell.to.y, wide = RIM;
+    const double rim[4][4] = {{x0 - wide, x1 + wide, y0 - wide, y0},
+                              {x0 - wide, x0, y0, y1},
+                              {x1, x1 + wide, y0, y1},
+                              {x0 - wide, x1 + wide, y1, y1 + wide}};
+    rqt_region *region = NULL;
+    int code = tiles_region(t, rim, 4, &region);
+    for (int n = 0; n < 9 && code == SQLITE_OK; n++) {
+        const block_tile near = {tile.level, tile.i + n % 3 - 1, tile.j + n / 3 - 1};
+        if (block_exists(t, near)) code = force_corners(t, near, block_plan_of(t)->level[tile.level].rule);
+    }
+    if (code == SQLITE_OK) code = query(t, tile, region, patch, error);
+    rqt_region_free(region);
+    return code;
 }
 
 /* ------------------------------------------------------------------------------------------------ in space -- */
@@ -129,64 +144,62 @@ static int place_vertex(const tiles *t, const rqt_patch_vertex *v, const earth_a
                       lat->degrees);
 }
 
-static void turn_normal(const earth_angle *lon, const earth_angle *lat, const float enu[3], int8_t out[3]) {
-    double normal[3];
-    earth_turn(lon, lat, (const double[3]){(double)enu[0], (double)enu[1], (double)enu[2]}, normal);
-    for (int k = 0; k < 3; k++) out[k] = (int8_t)rint(NORMAL_UNITS * normal[k]);
-}
-
-static int place_all(const tiles *t, const float *enu, angles *known, double *xyz, block_mesh *mesh, char **error) {
+static int place_all(const tiles *t, const rqt_patch *patch, double *xyz, char **error) {
     const rqt_placement *at = &t->terrain->placement;
+    angles *known = sqlite3_malloc64(sizeof *known);
+    if (!known) return SQLITE_NOMEM;
     int code = SQLITE_OK;
     earth_angles_clear(&known->lon);
     earth_angles_clear(&known->lat);
-    for (size_t i = 0; i < mesh->patch.vertex_count && code == SQLITE_OK; i++) {
-        const rqt_patch_vertex *v = &mesh->patch.vertices[i];
+    for (size_t i = 0; i < patch->vertex_count && code == SQLITE_OK; i++) {
+        const rqt_patch_vertex *v = &patch->vertices[i];
         const earth_angle *lon = earth_angle_of(&known->lon, v->col, at->x0 + v->col * at->dx),
                           *lat = earth_angle_of(&known->lat, v->row, latitude(at, v->row));
         code = place_vertex(t, v, lon, lat, xyz + 3 * i, error);
-        turn_normal(lon, lat, enu + 3 * i, mesh->normal + 3 * i);
     }
+    sqlite3_free(known);
     return code;
 }
 
 /* xyz: of each vertex. */
-static void round_places(const double *xyz, size_t count, double step, block_mesh *mesh) {
+static void choose_origin(const double *xyz, size_t count, double step, double origin[3]) {
     const double unit = fmax(step, 1);
-    for (int k = 0; k < 3; k++) {
-        double low = xyz[k], high = xyz[k];
-        for (size_t i = 1; i < count; i++) {
-            low = fmin(low, xyz[3 * i + (size_t)k]);
-            high = fmax(high, xyz[3 * i + (size_t)k]);
+    double low[3], high[3];
+    memcpy(low, xyz, sizeof low);
+    memcpy(high, xyz, sizeof high);
+    for (size_t i = 1; i < count; i++)
+        for (int k = 0; k < 3; k++) {
+            const double x = xyz[3 * i + (size_t)k];
+            if (x < low[k]) low[k] = x;
+            if (x > high[k]) high[k] = x;
         }
-        mesh->origin[k] = rint((low + high) / 2 / unit) * unit + 0.0;
-        for (size_t i = 0; i < count; i++)
-            mesh->offset[3 * i + (size_t)k] =
-                (int32_t)(rint(xyz[3 * i + (size_t)k] / step) - mesh->origin[k] / step);
-    }
+    for (int k = 0; k < 3; k++) origin[k] = rint((low[k] + high[k]) / 2 / unit) * unit + 0.0;
 }
 
-static int place_mesh(tiles *t, block_tile tile, block_mesh *mesh, char **error) {
-    const size_t count = mesh->patch.vertex_count;
-    double *xyz = sqlite3_malloc64(3 * count * sizeof *xyz);
-    angles *known = sqlite3_malloc64(sizeof *known);
-    float *enu = NULL;
-    mesh->offset = sqlite3_malloc64(3 * count * sizeof *mesh->offset);
-    mesh->normal = sqlite3_malloc64(3 * count * sizeof *mesh->normal);
-    int code = xyz && known && mesh->offset && mesh->normal ? SQLITE_OK : SQLITE_NOMEM;
-    if (code == SQLITE_OK) code = store_normals(t->store, t->terrain, &mesh->patch, &enu, error);
-    if (code == SQLITE_OK) code = place_all(t, enu, known, xyz, mesh, error);
-    if (code == SQLITE_OK) round_places(xyz, count, block_plan_of(t)->level[tile.level].step, mesh);
-    sqlite3_free(enu);
-    sqlite3_free(known);
+int block_places(const tiles *t, const rqt_patch *patch, double step, double *origin, bool has_origin,
+                 int32_t **offset, char **error) {
+    const size_t count = patch->vertex_count;
+    double *xyz = sqlite3_malloc64((3 * count + 1) * sizeof *xyz);
+    *offset = sqlite3_malloc64((3 * count + 1) * sizeof **offset);
+    int code = xyz && *offset ? place_all(t, patch, xyz, error) : SQLITE_NOMEM;
+    if (code == SQLITE_OK && !has_origin) choose_origin(xyz, count, step, origin);
+    const double from[3] = {origin[0] / step, origin[1] / step, origin[2] / step};
+    for (size_t i = 0; i < count && code == SQLITE_OK; i++)
+        for (size_t k = 0; k < 3; k++) (*offset)[3 * i + k] = (int32_t)(rint(xyz[3 * i + k] / step) - from[k]);
     sqlite3_free(xyz);
     return code;
 }
 
 int block_mesh_make(tiles *t, block_tile tile, block_mesh *mesh, char **error) {
+    rqt_region *region = NULL;
     *mesh = (block_mesh){0};
-    int code = query(t, tile, &mesh->patch, error);
-    if (code == SQLITE_OK && mesh->patch.triangle_count > 0) code = place_mesh(t, tile, mesh, error);
+    int code = make_corner(t, tile, 1, &region);
+    if (code == SQLITE_OK) code = query(t, tile, region, &mesh->patch, error);
+    rqt_region_free(region);
+    if (code != SQLITE_OK || mesh->patch.triangle_count == 0) return code;
+    code = block_places(t, &mesh->patch, block_plan_of(t)->level[tile.level].step, mesh->origin, false,
+                        &mesh->offset, error);
+    if (code == SQLITE_OK) code = block_normals(t, tile, mesh, error);
     return code;
 }
 

@@ -132,6 +132,7 @@ void block_plan_free(void *made) {
     block_plan *plan = made;
     if (!plan) return;
     geo_frame_free(plan->frame);
+    for (int l = 0; l < TILES_LEVELS; l++) rqt_rule_free(plan->level[l].rule);
     for (int series = 0; series < BLOCK_SERIES; series++)
         for (int l = 0; l < TILES_LEVELS; l++) sqlite3_free(plan->ranges[series][l]);
     sqlite3_free(plan);

@@ -291,19 +291,7 @@ int plan_ranges(const tiles *t, int z, tile_range ranges[MOST_TURNS]) {
 }
 
 int plan_region(const tiles *t, const tile_place *place, rqt_region **region) {
-    const rqt_placement as_it_is = {0, 0, 1, 1};
-    char text[MOST_TURNS * 256] = "MULTIPOLYGON(", *end = text + strlen(text);
-    rqt_geometry *geometry = NULL;
-    rqt_message why;
-    for (int i = 0; i < place->turns; i++) {
-        const double *box = place->turn[i].cut;
-        end += sprintf(end, "%s((%.17g %.17g,%.17g %.17g,%.17g %.17g,%.17g %.17g,%.17g %.17g))", i ? "," : "",
-                       box[0], box[2], box[1], box[2], box[1], box[3], box[0], box[3], box[0], box[2]);
-    }
-    sprintf(end, ")");
-    rqt_status status = rqt_geometry_parse(text, strlen(text), true, store_allocator(), &geometry, &why);
-    if (status == RQT_OK)
-        status = rqt_region_create(geometry, &as_it_is, &t->terrain->lattice, store_allocator(), region);
-    rqt_geometry_free(geometry);
-    return status == RQT_OK ? SQLITE_OK : SQLITE_NOMEM;
+    double boxes[MOST_TURNS][4];
+    for (int i = 0; i < place->turns; i++) memcpy(boxes[i], place->turn[i].cut, sizeof boxes[i]);
+    return tiles_region(t, boxes, place->turns, region);
 }

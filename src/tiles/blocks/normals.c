@@ -1,0 +1,167 @@
+/* normals.c - normals of a tile's vertices, in space.
+ *
+ * On the last level, whose mesh has all samples, they are those of the full-resolution grid (store_normals).
+ *
+ * On the others the normal at a vertex is that of its star, the triangles of the level's mesh that have it: the sum
+ * of their area vectors, which is the mean of their normals by area. Surfaces with the same rim have the same sum of
+ * area vectors, whatever lies between. So that is the mean normal of the terrain itself over the star, but for what
+ * the rim is off: the light that a vertex has to give to all samples around it. Slopes of the full-resolution
+ * grid at the vertex would say what is true of one sample in thousands; and whoever wants them reads all blocks
+ * of the last level for a tile of the first.
+ *
+ * A star is of the level's mesh and not of a tile: at the sides of a cell it has triangles of the cells next to
+ * it, asked for along a rim. Places are whole steps, fewer than 2^24 for what two places of a triangle differ by,
+ * so area vectors and their sums are exact in doubles, in whatever order: both tiles have the same one.
+ */
+#include "blocks.h"
+#include "earth.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { NORMAL_UNITS = 127 };
+
+static void round_normal(const double n[3], int8_t out[3]) {
+    const double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    for (int k = 0; k < 3; k++) out[k] = (int8_t)rint(NORMAL_UNITS * n[k] / length);
+}
+
+/* -------------------------------------------------------------------------------------------- the last level -- */
+
+typedef struct angles {
+    earth_angles lon, lat;
+} angles;
+
+static int take_full_resolution(tiles *t, block_mesh *mesh, char **error) {
+    const rqt_placement *at = &t->terrain->placement;
+    angles *known = sqlite3_malloc64(sizeof *known);
+    float *enu = NULL;
+    int code = known ? store_normals(t->store, t->terrain, &mesh->patch, &enu, error) : SQLITE_NOMEM;
+    if (code == SQLITE_OK) {
+        earth_angles_clear(&known->lon);
+        earth_angles_clear(&known->lat);
+    }
+    for (size_t i = 0; i < mesh->patch.vertex_count && code == SQLITE_OK; i++) {
+        const rqt_patch_vertex *v = &mesh->patch.vertices[i];
+        const float *n = enu + 3 * i;
+        double normal[3];
+        earth_turn(earth_angle_of(&known->lon, v->col, at->x0 + v->col * at->dx),
+                   earth_angle_of(&known->lat, v->row, at->y0 + v->row * at->dy),
+                   (const double[3]){(double)n[0], (double)n[1], (double)n[2]}, normal);
+        round_normal(normal, mesh->normal + 3 * i);
+    }
+    sqlite3_free(enu);
+    sqlite3_free(known);
+    return code;
+}
+
+/* ------------------------------------------------------------------------------------------------- stars -- */
+
+/* Twice the area vector of a triangle, in steps. */
+static void area_vector(const int32_t *offset, const uint32_t corner[3], double n[3]) {
+    const int32_t *a = offset + 3 * (size_t)corner[0], *b = offset + 3 * (size_t)corner[1],
+                  *c = offset + 3 * (size_t)corner[2];
+    const double u[3] = {(double)b[0] - a[0], (double)b[1] - a[1], (double)b[2] - a[2]},
+                 v[3] = {(double)c[0] - a[0], (double)c[1] - a[1], (double)c[2] - a[2]};
+    for (int k = 0; k < 3; k++) n[k] = u[(k + 1) % 3] * v[(k + 2) % 3] - u[(k + 2) % 3] * v[(k + 1) % 3];
+}
+
+static void add(double *sum, const double n[3]) {
+    for (int k = 0; k < 3; k++) sum[k] += n[k];
+}
+
+/* A vertex at the sides of the tile's cell. */
+typedef struct side_vertex {
+    int32_t col, row;
+    uint32_t vertex;
+} side_vertex;
+
+static int by_place(const void *a, const void *b) {
+    const side_vertex *p = a, *q = b;
+    if (p->row != q->row) return p->row < q->row ? -1 : 1;
+    return (p->col > q->col) - (p->col < q->col);
+}
+
+typedef struct side_list {
+    side_vertex *items;
+    size_t count;
+} side_list;
+
+static void list_sides(const tiles *t, block_tile tile, const rqt_patch *patch, side_list *sides) {
+    const block_cell cell = block_cell_of(t, tile);
+    for (size_t i = 0; i < patch->vertex_count; i++) {
+        const rqt_patch_vertex *v = &patch->vertices[i];
+        if (v->col == cell.from.x || v->col == cell.to.x || v->row == cell.from.y || v->row == cell.to.y)
+            sides->items[sides->count++] = (side_vertex){v->col, v->row, (uint32_t)i};
+    }
+    qsort(sides->items, sides->count, sizeof *sides->items, by_place);
+}
+
+enum { OTHER = UINT32_MAX };
+static uint32_t find_side(const side_list *sides, int32_t col, int32_t row) {
+    const side_vertex wanted = {.col = col, .row = row};
+    const side_vertex *found = bsearch(&wanted, sides->items, sides->count, sizeof *sides->items, by_place);
+    return found ? found->vertex : OTHER;
+}
+
+/* around: the patch of block_mesh_around. */
+static int add_around(const tiles *t, block_tile tile, const block_mesh *mesh, const rqt_patch *around,
+                      const int32_t *offset, double *sums) {
+    const size_t count = around->vertex_count;
+    side_list sides = {.items = sqlite3_malloc64((mesh->patch.vertex_count + 1) * sizeof *sides.items)};
+    uint32_t *own = sqlite3_malloc64((count + 1) * sizeof *own); /* the same vertex of the tile */
+    const int code = sides.items && own ? SQLITE_OK : SQLITE_NOMEM;
+    if (code == SQLITE_OK) {
+        list_sides(t, tile, &mesh->patch, &sides);
+        for (size_t i = 0; i < count; i++)
+            own[i] = find_side(&sides, around->vertices[i].col, around->vertices[i].row);
+        for (size_t i = 0; i < around->triangle_count; i++) {
+            const uint32_t *corner = around->triangles + 3 * i;
+            double n[3];
+            area_vector(offset, corner, n);
+            for (int c = 0; c < 3; c++)
+                if (own[corner[c]] != OTHER) add(sums + 3 * (size_t)own[corner[c]], n);
+        }
+    }
+    sqlite3_free(sides.items);
+    sqlite3_free(own);
+    return code;
+}
+
+static int sum_around(tiles *t, block_tile tile, block_mesh *mesh, double *sums, char **error) {
+    rqt_patch around = {0};
+    int32_t *offset = NULL;
+    int code = block_mesh_around(t, tile, &around, error);
+    if (code == SQLITE_OK)
+        code = block_places(t, &around, block_plan_of(t)->level[tile.level].step, mesh->origin, true, &offset,
+                            error);
+    if (code == SQLITE_OK) code = add_around(t, tile, mesh, &around, offset, sums);
+    sqlite3_free(offset);
+    store_keep(t->store, &around);
+    return code;
+}
+
+static int take_stars(tiles *t, block_tile tile, block_mesh *mesh, char **error) {
+    const size_t count = mesh->patch.vertex_count;
+    double *sums = sqlite3_malloc64(3 * count * sizeof *sums);
+    if (!sums) return SQLITE_NOMEM;
+    memset(sums, 0, 3 * count * sizeof *sums);
+    for (size_t i = 0; i < mesh->patch.triangle_count; i++) {
+        const uint32_t *corner = mesh->patch.triangles + 3 * i;
+        double n[3];
+        area_vector(mesh->offset, corner, n);
+        for (int c = 0; c < 3; c++) add(sums + 3 * (size_t)corner[c], n);
+    }
+    const int code = sum_around(t, tile, mesh, sums, error);
+    for (size_t i = 0; i < count && code == SQLITE_OK; i++) round_normal(sums + 3 * i, mesh->normal + 3 * i);
+    sqlite3_free(sums);
+    return code;
+}
+
+int block_normals(tiles *t, block_tile tile, block_mesh *mesh, char **error) {
+    mesh->normal = sqlite3_malloc64(3 * mesh->patch.vertex_count * sizeof *mesh->normal);
+    if (!mesh->normal) return SQLITE_NOMEM;
+    return tile.level == block_plan_of(t)->finest ? take_full_resolution(t, mesh, error)
+                                                  : take_stars(t, tile, mesh, error);
+}
