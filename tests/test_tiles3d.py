@@ -371,6 +371,7 @@ def check_terrain(t, is_whole):
     empty = [p for p in there if p not in tiles and p[0] == finest and exact_cover(t, t.cell(*p))[1]]
     s.equal(name + ": no tile of the last level that has such a triangle is left out", empty, [])
     check_seams(t)
+    check_stars(t)
     # Regions.
     s.equal(name + ": regions lie in those above", [p for p in there if p[0] > 0 and not holds(there[p[0] - 1, p[1] // 2, p[2] // 2][1], there[p][1])][:5], [])
     most = 0.0
@@ -399,6 +400,48 @@ def check_normals(t):
             cosine = dot(n, tile.normals[v]) / math.sqrt(dot(n, n) * dot(tile.normals[v], tile.normals[v]))
             worst, seen = max(worst, math.degrees(math.acos(min(1, cosine)))), seen + 1
     s.check("%s: normals are the terrain's, from its full resolution (%d, worst %.2f degrees)" % (t.name, seen, worst), seen > 1000 and worst < 0.7, worst)
+
+
+def plus(a, b):
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+def off_by(normal, n):
+    """A normal in 127ths beside a vector of any length: the most that a number of it is off."""
+    length = math.hypot(*n)
+    return max(abs(a - 127 * b / length) for a, b in zip(normal, n))
+
+
+def check_stars(t):
+    """On the others: at each vertex the sum of the area vectors of all triangles of the level that have it, whatever tiles they are
+    of. In whole steps, which are Python's integers; of a star without area, the ellipsoid's."""
+    wrong, seen, shared, lone = [], 0, 0, 0
+    for level in range(t.set.levels - 1):
+        sums, of = {}, {}
+        tiles = {p: tile for p, tile in t.tiles.items() if p[0] == level}
+        for p, tile in tiles.items():
+            # A pole's samples are one place, so these are nobody else's; of those at a corner of the tile half the star is next to it.
+            of[p] = [sample if sample[0] is not None else (p, v) for v, sample in enumerate(t.samples_of(tile, t.cell(*p)))]
+            places = [tuple(round(x / tile.told["step"]) for x in xyz) for xyz in tile.xyz]
+            for triangle in tile.triangles:
+                (ax, ay, az), (bx, by, bz), (cx, cy, cz) = (places[v] for v in triangle)
+                ux, uy, uz, vx, vy, vz = bx - ax, by - ay, bz - az, cx - ax, cy - ay, cz - az
+                n = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+                for v in triangle:
+                    sums[of[p][v]] = plus(sums.get(of[p][v], (0, 0, 0)), n)
+        for p, tile in tiles.items():
+            c0, c1, r0, r1 = t.cell(*p)
+            for v, sample in enumerate(of[p]):
+                stars = [sums[sample]]
+                if sample[0] is p:
+                    stars += [plus(stars[0], n) for key, n in sums.items() if key[0] in ((level, p[1] - 1, p[2]), (level, p[1] + 1, p[2]))]
+                lone += stars[0] == (0, 0, 0)
+                off = min(off_by(tile.normals[v], n if n != (0, 0, 0) else (tile.xyz[v][0], tile.xyz[v][1], tile.xyz[v][2] / (1 - F) ** 2)) for n in stars)
+                seen, shared = seen + 1, shared + (sample[0] in (c0, c1) or sample[1] in (r0, r1))
+                if off > 0.5 + 1e-6:
+                    wrong.append((p, sample, tile.normals[v], off))
+    s.check("%s: normals of coarser levels are the stars' (%d vertices, %d of them at sides, %d without a star)" % (t.name, seen, shared, lone),
+            seen > 0 and not wrong, (len(wrong), wrong[:3]))
 
 
 def check_seams(t):

@@ -66,7 +66,8 @@ static uint8_t choose_row(const rqt_code *restrict error, const uint8_t *restric
 
 /* By thresholds of ranks: what is selected is closed (rule.c), so nobody need go down to it. A vertex of the block
  * has the rank that the powers of two in its column and row give it, where the sides have as many as the block is
- * wide; corners alone may have more. So rows whose numbers have the same power of two in them have the same ranks. */
+ * wide; corners alone may have more. So rows whose numbers have the same power of two in them have the same ranks.
+ */
 static uint8_t choose_rows_by_rank(const walk *w, const int32_t by_rank[RQT_RANKS], uint8_t mask) {
     int32_t threshold[RQT_MAX_BLOCK_K + 1][(1 << RQT_MAX_BLOCK_K) + 1];
     const uint32_t n = (uint32_t)w->n, k = (uint32_t)w->query->k;
@@ -88,14 +89,15 @@ static uint8_t choose_rows_by_rank(const walk *w, const int32_t by_rank[RQT_RANK
 /* Are so many selected that going through all is quicker than going down to them? By a few of every second row and
  * column, centres of cells. */
 static bool are_many(const walk *w, const int32_t by_rank[RQT_RANKS]) {
-    enum { LOOKS = 8 };
-    const uint32_t k = (uint32_t)w->query->k, n = (uint32_t)w->n, apart = n / LOOKS, first = 2;
-    if (k < 5) return true;
+    enum { LOOKS = 4 };
+    const uint32_t k = (uint32_t)w->query->k, n = (uint32_t)w->n, apart = n / LOOKS,
+                   first = 2; /* n - 1 is 16 or more */
+    if (k < 4) return true;
     const int32_t threshold = by_rank[2 * (__builtin_ctz((unsigned)w->place.stride) + 1) + 1];
     uint32_t count = 0;
     for (uint32_t i = 0; i < LOOKS * LOOKS; i++)
         count += w->block->error[(i / LOOKS * apart + first) * n + i % LOOKS * apart + first] > threshold;
-    return count > LOOKS * LOOKS / 2;
+    return count > LOOKS * LOOKS / 4;
 }
 
 static uint8_t choose_by_rank(const walk *w, uint8_t mask) {
@@ -352,6 +354,8 @@ static rqt_relation relation_of(const walk *w, rqt_vertex a, rqt_vertex b, rqt_v
 static void walk_valid(walk *w, const half *from) {
     half stack[MOST_SPLITS + 1], *top = stack, h = *from;
     const uint8_t *const chosen = w->chosen, *const flags = w->block->flags;
+    const bool is_list = w->query->product == RQT_PRODUCT_TRIANGLES;
+    uint32_t *const out = w->patch->triangles;
     for (;;) {
         const uint32_t m = (h.l + h.r) / 2;
         if (h.splits > 0 && chosen[m]) {
@@ -361,7 +365,14 @@ static void walk_valid(walk *w, const half *from) {
         }
         if (flags[h.a] & flags[h.l] & flags[h.r] & RQT_VALID) {
             const uint32_t a = patch_place(w, h.a), l = patch_place(w, h.l), r = patch_place(w, h.r);
-            patch_triangle(w, a, l, r, h.clockwise);
+            if (is_list) {
+                uint32_t *const t = out + 3 * w->patch->triangle_count++;
+                t[0] = a;
+                t[1] = h.clockwise ? l : r;
+                t[2] = h.clockwise ? r : l;
+            } else {
+                patch_triangle(w, a, l, r, h.clockwise);
+            }
         }
         if (top == stack) return;
         h = *--top;

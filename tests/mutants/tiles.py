@@ -51,6 +51,7 @@ MUTANTS = [
     ("covers: one block speaks for all", "src/store/query.c", "if (one != *cover) *cover = STORE_COVER_UNKNOWN;", "", "test_store_cover", COVERED),
     ("covers: blocks answer as without a rule", "src/store/query.c", "if (code == SQLITE_OK && options->rule && rqt_rule_set_eps(options->rule, eps) == RQT_OK)", "if (!options)",
      "test_store_cover", COVERED),
+    ("rules: all ranks of a block go down by one threshold", "src/core/rule_choose.c", "return c->by_rank[rank];", "return c->by_rank[0];", "test_core_rule", "eps_lowered_by_rank_alone_is_its_definition"),
     ("rules: rows of a block have the ranks of its first", "src/core/walk.c", "threshold[__builtin_ctz(v | (n - 1))]", "threshold[0]", "test_core_rule", "eps_lowered_by_rank_alone_is_its_definition"),
     ("normals: a row's metres are those of another", "src/store/normals.c", "if (k->row != row) {", "if (k->row < 0) {", "test_sql_normals.py", "normal"),
     ("tiles: longitudes count once", PLAN, "*last = (int)ceil((e.east + 180) / 360);", "*last = 0;", TILES, "358.5"),

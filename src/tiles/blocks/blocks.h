@@ -18,10 +18,10 @@ enum { SUBTREE_LEVELS = 4 };
 enum { CONTENT, SUBTREES, BLOCK_SERIES };
 
 typedef struct block_level {
-    double error;  /* no valid sample is further from the mesh in space, before positions are rounded: metres */
-    double centre; /* what curvature takes from the two triangles that a cell is at least made of */
-    double step;   /* positions are whole ones: a power of two */
-    double round;  /* what rounding moves a vertex by, at most */
+    double error;   /* no valid sample is further from the mesh in space, before positions are rounded: metres */
+    double centre;  /* what curvature takes from the two triangles that a cell is at least made of */
+    double step;    /* positions are whole ones: a power of two */
+    double round;   /* what rounding moves a vertex by, at most */
     rqt_rule *rule; /* its mesh, in the cells that were asked for; NULL: none was */
 } block_level;
 

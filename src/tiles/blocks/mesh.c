@@ -18,8 +18,8 @@
 #include <string.h>
 
 #define BEYOND_POLE (90 * (1 + 1e-9)) /* a row at a pole, by a rounding */
-enum { CORNER = 16 }; /* of a side, one part */
-#define RIM 0.5       /* samples: any triangle at a side meets it */
+enum { CORNER = 16 };                 /* of a side, one part */
+#define RIM 0.5                       /* samples: any triangle at a side meets it */
 
 /* ---------------------------------------------------------------------------------------------------- mesh -- */
 

@@ -3,9 +3,9 @@
  * On the last level, whose mesh has all samples, they are those of the full-resolution grid (store_normals).
  *
  * On the others the normal at a vertex is that of its star, the triangles of the level's mesh that have it: the sum
- * of their area vectors, which is the mean of their normals by area. Surfaces with the same rim have the same sum of
- * area vectors, whatever lies between. So that is the mean normal of the terrain itself over the star, but for what
- * the rim is off: the light that a vertex has to give to all samples around it. Slopes of the full-resolution
+ * of their area vectors, which is the mean of their normals by area. Surfaces with the same rim have the same sum
+ * of area vectors, whatever lies between. So that is the mean normal of the terrain itself over the star, but for
+ * what the rim is off: the light that a vertex has to give to all samples around it. Slopes of the full-resolution
  * grid at the vertex would say what is true of one sample in thousands; and whoever wants them reads all blocks
  * of the last level for a tile of the first.
  *
@@ -23,8 +23,8 @@
 enum { NORMAL_UNITS = 127 };
 
 static void round_normal(const double n[3], int8_t out[3]) {
-    const double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-    for (int k = 0; k < 3; k++) out[k] = (int8_t)rint(NORMAL_UNITS * n[k] / length);
+    const double unit = NORMAL_UNITS / sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    for (int k = 0; k < 3; k++) out[k] = (int8_t)rint(unit * n[k]);
 }
 
 /* -------------------------------------------------------------------------------------------- the last level -- */
@@ -59,15 +59,17 @@ static int take_full_resolution(tiles *t, block_mesh *mesh, char **error) {
 /* ------------------------------------------------------------------------------------------------- stars -- */
 
 /* Twice the area vector of a triangle, in steps. */
-static void area_vector(const int32_t *offset, const uint32_t corner[3], double n[3]) {
+static inline void area_vector(const int32_t *offset, const uint32_t corner[3], double n[3]) {
     const int32_t *a = offset + 3 * (size_t)corner[0], *b = offset + 3 * (size_t)corner[1],
                   *c = offset + 3 * (size_t)corner[2];
     const double u[3] = {(double)b[0] - a[0], (double)b[1] - a[1], (double)b[2] - a[2]},
                  v[3] = {(double)c[0] - a[0], (double)c[1] - a[1], (double)c[2] - a[2]};
-    for (int k = 0; k < 3; k++) n[k] = u[(k + 1) % 3] * v[(k + 2) % 3] - u[(k + 2) % 3] * v[(k + 1) % 3];
+    n[0] = u[1] * v[2] - u[2] * v[1];
+    n[1] = u[2] * v[0] - u[0] * v[2];
+    n[2] = u[0] * v[1] - u[1] * v[0];
 }
 
-static void add(double *sum, const double n[3]) {
+static inline void add(double *sum, const double n[3]) {
     for (int k = 0; k < 3; k++) sum[k] += n[k];
 }
 
@@ -134,12 +136,20 @@ static int sum_around(tiles *t, block_tile tile, block_mesh *mesh, double *sums,
     int32_t *offset = NULL;
     int code = block_mesh_around(t, tile, &around, error);
     if (code == SQLITE_OK)
-        code = block_places(t, &around, block_plan_of(t)->level[tile.level].step, mesh->origin, true, &offset,
-                            error);
+        code =
+            block_places(t, &around, block_plan_of(t)->level[tile.level].step, mesh->origin, true, &offset, error);
     if (code == SQLITE_OK) code = add_around(t, tile, mesh, &around, offset, sums);
     sqlite3_free(offset);
     store_keep(t->store, &around);
     return code;
+}
+
+/* A star without area, at a pole, whose samples are one place. */
+static void take_ellipsoid(const tiles *t, block_tile tile, const block_mesh *mesh, const int32_t offset[3],
+                           double n[3]) {
+    const double step = block_plan_of(t)->level[tile.level].step;
+    for (int k = 0; k < 3; k++) n[k] = mesh->origin[k] + offset[k] * step;
+    n[2] *= (EARTH_A / EARTH_B) * (EARTH_A / EARTH_B);
 }
 
 static int take_stars(tiles *t, block_tile tile, block_mesh *mesh, char **error) {
@@ -154,7 +164,11 @@ static int take_stars(tiles *t, block_tile tile, block_mesh *mesh, char **error)
         for (int c = 0; c < 3; c++) add(sums + 3 * (size_t)corner[c], n);
     }
     const int code = sum_around(t, tile, mesh, sums, error);
-    for (size_t i = 0; i < count && code == SQLITE_OK; i++) round_normal(sums + 3 * i, mesh->normal + 3 * i);
+    for (size_t i = 0; i < count && code == SQLITE_OK; i++) {
+        double *n = sums + 3 * i;
+        if (n[0] == 0 && n[1] == 0 && n[2] == 0) take_ellipsoid(t, tile, mesh, mesh->offset + 3 * i, n);
+        round_normal(n, mesh->normal + 3 * i);
+    }
     sqlite3_free(sums);
     return code;
 }
