@@ -535,6 +535,9 @@ flat = [[0 if col < 40 else 3 * (col - 39) for col in range(65)] for _ in range(
 PLAIN = terrain("plain", s.write_grid(s.temp("plain.asc"), flat, 5, 43, 1 / 3600, s.WGS84), raster=flat, block=4)
 s.equal("plain: a tile of sea has two triangles, and states centimetres",
         [(len(PLAIN.tiles[2, 0, 0].triangles), PLAIN.set.there[2, 0, 0][0] < 0.1)], [(2, True)])
+# Two planes that meet where cells do: a star there knows where the triangles next to the cell end.
+bent = [[3 * max(0, col - 32) for col in range(65)] for _ in range(65)]
+terrain("bent", s.write_grid(s.temp("bent.asc"), bent, 5, 43, 1 / 3600, s.WGS84), raster=bent, block=3)
 # Heights above EGM96 are in space where GDAL has them, above the ellipsoid.
 geoid = s.temp("geoid.tif")
 s.run(["gdal_translate", "-q", "-a_srs", "EPSG:4326+5773", s.write_grid(s.temp("sea.asc"), hill, 7, 46, 1 / 64, s.WGS84), geoid])
