@@ -204,6 +204,8 @@ class Terrain:
         db.close()
         self.raster = raster or s.read_raster(path)
         self.height, self.width = len(self.raster), len(self.raster[0])
+        # Does it go once around the Earth? Then its last column is its first, whose heights both have.
+        self.closes = abs((self.width - 1) * self.dx - 360) < 1e-6
         self.side = 1
         while self.side < max(self.height, self.width) - 1:
             self.side *= 2
@@ -220,6 +222,9 @@ class Terrain:
         if (col, row) not in self.space:
             self.space[col, row] = ecef(self.x0 + col * self.dx, self.y0 + row * self.dy, self.raster[row][col])
         return self.space[col, row]
+
+    def vertex_place(self, col, row):
+        return ecef(self.x0, self.y0 + row * self.dy, self.raster[row][0]) if self.closes and col == self.width - 1 else self.place(col, row)
 
     def cell(self, level, x, y):
         """Columns and rows of a tile, clamped."""
@@ -243,6 +248,13 @@ class Terrain:
             if col < cell[0] and abs(col + turn - cell[1]) < 0.1:
                 col = cell[1]
             found.append((col, row))
+        if self.closes and cell[:2] == (0, self.width - 1):
+            # Both ends are in the tile, and one place: by the columns of what a vertex is joined to.
+            ends = {v for v, (col, _) in enumerate(found) if col in (0, cell[1])}
+            for triangle in tile.triangles:
+                others = [found[v][0] for v in triangle if v not in ends and found[v][0] is not None]
+                for v in ends.intersection(triangle) if others else ():
+                    found[v] = (cell[1] if sum(others) > len(others) * cell[1] / 2 else 0), found[v][1]
         return found
 
 
@@ -343,7 +355,7 @@ def check_terrain(t, is_whole):
         for v, (col, row) in enumerate(samples):
             at = cell[0] if col is None else col
             if not (cell[0] <= at <= cell[1] and cell[2] <= row <= cell[3]) or t.raster[row][at] is None or \
-                    max(abs(d) for d in minus(tile.xyz[v], t.place(at, row))) > step / 2 + 1e-6:
+                    max(abs(d) for d in minus(tile.xyz[v], t.vertex_place(at, row))) > step / 2 + 1e-6:
                 strangers.append((p, col, row))
         share, covered, vertical = measure(t, p, tile, samples, there[p][0])
         worst, level_worst[p[0]], seen = max(worst, share), max(level_worst[p[0]], share), seen + len(covered)
@@ -421,7 +433,7 @@ def check_stars(t):
         tiles = {p: tile for p, tile in t.tiles.items() if p[0] == level}
         for p, tile in tiles.items():
             # A pole's samples are one place, so these are nobody else's; of those at a corner of the tile half the star is next to it.
-            of[p] = [sample if sample[0] is not None else (p, v) for v, sample in enumerate(t.samples_of(tile, t.cell(*p)))]
+            of[p] = [(p, v) if col is None else (0 if t.closes and col == t.width - 1 else col, row) for v, (col, row) in enumerate(t.samples_of(tile, t.cell(*p)))]
             places = [tuple(round(x / tile.told["step"]) for x in xyz) for xyz in tile.xyz]
             for triangle in tile.triangles:
                 (ax, ay, az), (bx, by, bz), (cx, cy, cz) = (places[v] for v in triangle)
@@ -434,7 +446,7 @@ def check_stars(t):
             for v, sample in enumerate(of[p]):
                 stars = [sums[sample]]
                 if sample[0] is p:
-                    stars += [plus(stars[0], n) for key, n in sums.items() if key[0] in ((level, p[1] - 1, p[2]), (level, p[1] + 1, p[2]))]
+                    stars += [plus(stars[0], n) for key, n in sums.items() if isinstance(key[0], tuple) and key != sample]
                 lone += stars[0] == (0, 0, 0)
                 off = min(off_by(tile.normals[v], n if n != (0, 0, 0) else (tile.xyz[v][0], tile.xyz[v][1], tile.xyz[v][2] / (1 - F) ** 2)) for n in stars)
                 seen, shared = seen + 1, shared + (sample[0] in (c0, c1) or sample[1] in (r0, r1))
@@ -467,6 +479,20 @@ def check_seams(t):
                 lone = [p for p in both if sum(any(p == q for q, _ in side) for side in border) == 1]
                 different += [(level, x, y, other, p) for p in lone if not is_at_outline(t, p)]
     s.check("%s: what neighbours share is decoded to the same doubles (%d vertices)" % (t.name, compared), compared > 0 and not different, different[:5])
+
+
+def check_closed(t):
+    """Around the Earth: the first and the last column of each level have the same places, bit by bit, and the same normals."""
+    compared, different = 0, []
+    for level in range(t.set.levels):
+        ends = [set(), set()]
+        for p, tile in t.tiles.items():
+            for v, (col, _) in enumerate(t.samples_of(tile, t.cell(*p)) if p[0] == level else ()):
+                if col in (0, t.width - 1):
+                    ends[col > 0].add((tile.xyz[v], tile.normals[v]))
+        compared += len(ends[0])
+        different += [(level, len(ends[0] - ends[1]), len(ends[1] - ends[0]), sorted(ends[0] ^ ends[1])[:2])] if ends[0] != ends[1] else []
+    s.check("%s: both ends are one (%d vertices)" % (t.name, compared), t.closes and compared > 0 and not different, different)
 
 
 def is_at_outline(t, p):
@@ -513,6 +539,12 @@ PYRENEES = terrain("pyrenees", window("pyrenees", os.path.join(zipped, "N42E001.
 # All of the Earth, every sixth degree: both poles, the antimeridian twice.
 earth = [row[::6] for row in s.read_raster(os.path.join(s.DATA, "etopo1_1deg.tif"))[::6]]
 EARTH = terrain("F28_earth", s.write_grid(s.temp("earth.asc"), earth, -180, -90, 6, s.WGS84), raster=earth, block=3)
+
+check_closed(EARTH)
+# Rough ground that goes around, its ends a metre apart here and there, begins anywhere, and has no poles.
+around = [row + [row[0] + y % 3 - 1] for y, row in enumerate(s.rough_grid(96, 33, 17, relief=4000))]
+ROUND = terrain("F28_round", s.write_grid(s.temp("round.asc"), around, 33.5, -60, 3.75, s.WGS84), raster=around, block=4)
+check_closed(ROUND)
 
 # Voids, and an odd size.
 hole = s.rough_grid(75, 67, 7, relief=300)

@@ -6,7 +6,7 @@ RELIEF = "src/store/relief.c"
 
 MUTANTS = [
     # errors
-    ("3d-tiles: the mesh is too coarse", MESH, "level[tile.level].error,\n                                           &options, patch", "level[tile.level].error * 1.1,\n                                           &options, patch", TILES, "no sample is further"),
+    ("3d-tiles: the mesh is too coarse", MESH, "level[tile.level].error, &options, patch", "level[tile.level].error * 1.1, &options, patch", TILES, "no sample is further"),
     ("3d-tiles: curvature takes nothing", MESH, ": l == plan->finest ? error : sag;", ": l == plan->finest ? error : 0;", TILES, "africa: no sample is further"),
     ("3d-tiles: rank by rank curvature takes any share", MESH, "sag + terrain->quantum_error <= error;", "sag * 0 + terrain->quantum_error <= error;", TILES, "no sample is further"),
     ("3d-tiles: a tile forgets the curvature of its halves", TILE, "rqt_code_metres(relief->error) + level->centre;", "rqt_code_metres(relief->error);", TILES, "no sample is further"),
@@ -21,7 +21,7 @@ MUTANTS = [
     ("3d-tiles: origins are between steps", MESH, "origin[k] = rint((low[k] + high[k]) / 2 / unit) * unit + 0.0;", "origin[k] = (low[k] + high[k]) / 2;", TILES, "within half a step"),
     ("3d-tiles: steps are too fine for floats", PLAN, "while (", "while (level->step < ldexp(1, -12) && ", TILES, "as the formats have them"),
     ("3d-tiles: normals are those of glTF's other axis", GLB, "*p++ = (uint8_t)n[2];", "*p++ = (uint8_t)n[1];", TILES, "normals"),
-    ("3d-tiles: stars end at the sides of tiles", NORMALS, "const int code = sum_around(t, tile, mesh, sums, error);", "const int code = SQLITE_OK;", TILES, "stars'"),
+    ("3d-tiles: stars end at the sides of tiles", NORMALS, "part = 0; part < BLOCK_PARTS", "part = 1; part < BLOCK_PARTS", TILES, "stars'"),
     ("3d-tiles: cells next to a tile's are not those of its level", MESH, "if (block_exists(t, near)) code", "if (n == 4) code", TILES, "stars'"),
     ("3d-tiles: at a pole normals are nowhere", NORMALS, "n[2] *= (EARTH_A / EARTH_B) * (EARTH_A / EARTH_B);", "n[2] = 0;", TILES, "stars'"),
     # places

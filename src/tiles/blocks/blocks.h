@@ -21,7 +21,7 @@ typedef struct block_level {
     double error;   /* no valid sample is further from the mesh in space, before positions are rounded: metres */
     double centre;  /* what curvature takes from the two triangles that a cell is at least made of */
     double step;    /* positions are whole ones: a power of two */
-    double round;   /* what rounding moves a vertex by, at most */
+    double round;   /* what rounding moves a vertex by, at most; and what a seam does */
     rqt_rule *rule; /* its mesh, in the cells that were asked for; NULL: none was */
 } block_level;
 
@@ -31,8 +31,9 @@ typedef struct block_plan {
     block_level level[TILES_LEVELS];
     double sag[RQT_RANKS + 2]; /* what curvature takes from a triangle, by the rank of its split vertex + 2: [1] is
                                   that of half a square of one sample, which has none */
-    geo_frame *frame;          /* geocentric, geoid included */
-    geo_geoid geoid;           /* zeros without one */
+    tile_seam seam;
+    geo_frame *frame;                               /* geocentric, geoid included */
+    geo_geoid geoid;                                /* zeros without one */
     tile_range *ranges[BLOCK_SERIES][TILES_LEVELS]; /* NULL: not yet asked for */
     size_t range_count[BLOCK_SERIES][TILES_LEVELS];
 } block_plan;
@@ -84,8 +85,13 @@ typedef struct block_mesh {
 /* Without a triangle where the tile has no content. */
 int block_mesh_make(tiles *t, block_tile tile, block_mesh *mesh, char **error);
 void block_mesh_free(tiles *t, block_mesh *mesh);
-/* The triangles of the level's mesh that are not the tile's, but have a vertex with it in common; and others. */
-int block_mesh_around(tiles *t, block_tile tile, rqt_patch *patch, char **error);
+/* Triangles of the level's mesh of which some have a vertex of the tile, at a part of its sides: those around it;
+ * and where the terrain closes and the tile is at an end, those at the other end, where the tile's vertices are
+ * those of the other column. */
+enum { AROUND_CELL, AT_LAST_COLUMN, AT_FIRST_COLUMN, BLOCK_PARTS };
+int block_mesh_around(tiles *t, block_tile tile, int part, rqt_patch *patch, char **error);
+/* Of a sample: columns that are one meridian have the same. */
+double block_longitude(const tiles *t, int32_t col);
 /* Places of a level's vertices, as a block_mesh has them; origin: chosen here, unless it has one. */
 int block_places(const tiles *t, const rqt_patch *patch, double step, double *origin, bool has_origin,
                  int32_t **offset, char **error);

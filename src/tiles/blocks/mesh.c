@@ -7,9 +7,9 @@
  * depend on the sample and the level alone. That is all that there is to seams. What the corners of a cell bring
  * along are corners of cells: so a level has one rule, in which those are forced that are asked for.
  *
- * At a pole a row of samples is one place, at the antimeridian the first and the last column may be: both are
- * rounded to the same steps, but for one that lies on the very edge between two; sines and cosines are off by 1e-9
- * m there.
+ * At a pole a row of samples is one place: all are rounded to the same steps, but for one that lies on the very
+ * edge between two; sines and cosines are off by 1e-9 m there. Around the Earth the first and the last column are
+ * one (../seam.c).
  */
 #include "blocks.h"
 #include "earth.h"
@@ -47,18 +47,46 @@ static int force_corners(const tiles *t, block_tile cell, rqt_rule *rule) {
     return status == RQT_OK ? SQLITE_OK : SQLITE_NOMEM;
 }
 
+/* What a query of a level asks for. */
+static store_query_options options_of(const tiles *t, int l) {
+    const block_plan *plan = block_plan_of(t);
+    return (store_query_options){.select = RQT_SELECT_THRESHOLD,
+                                 .outline = l == plan->finest ? RQT_OUTLINE_EXACT : RQT_OUTLINE_TOL,
+                                 .metric = RQT_METRIC_EXACT,
+                                 .product = RQT_PRODUCT_TRIANGLES,
+                                 .rule = plan->level[l].rule};
+}
+
+/* All cells at both ends first: what is forced for the seam depends on them. */
+static int close_seam(tiles *t, int l, char **error) {
+    const block_level *level = &block_plan_of(t)->level[l];
+    const rqt_lattice *lattice = &t->terrain->lattice;
+    const int scale = lattice->K - l;
+    const store_query_options options = options_of(t, l);
+    int code = SQLITE_OK;
+    for (int32_t j = 0; j <= (lattice->height - 2) >> scale && code == SQLITE_OK; j++) {
+        code = force_corners(t, (block_tile){l, 0, j}, level->rule);
+        if (code == SQLITE_OK)
+            code = force_corners(t, (block_tile){l, (lattice->width - 2) >> scale, j}, level->rule);
+    }
+    return code == SQLITE_OK ? seam_close(t, level->error, &options, error) : code;
+}
+
 /* *options: those of every query of a tile's level that asks for what lies in its cell. */
-static int begin_query(const tiles *t, block_tile tile, store_query_options *options) {
-    block_level *level = &block_plan_of(t)->level[tile.level];
-    const bool is_last = tile.level == block_plan_of(t)->finest;
-    int code = level->rule ? SQLITE_OK : make_rule(t, tile.level, &level->rule);
-    if (code == SQLITE_OK) code = force_corners(t, tile, level->rule);
-    *options = (store_query_options){.select = RQT_SELECT_THRESHOLD,
-                                     .outline = is_last ? RQT_OUTLINE_EXACT : RQT_OUTLINE_TOL,
-                                     .metric = RQT_METRIC_EXACT,
-                                     .product = RQT_PRODUCT_TRIANGLES,
-                                     .rule = level->rule};
-    return code;
+static int begin_query(tiles *t, block_tile tile, store_query_options *options, char **error) {
+    block_plan *plan = block_plan_of(t);
+    block_level *level = &plan->level[tile.level];
+    int code = SQLITE_OK;
+    if (!level->rule) {
+        code = make_rule(t, tile.level, &level->rule);
+        if (code == SQLITE_OK && plan->seam.q) code = close_seam(t, tile.level, error);
+        if (code != SQLITE_OK) {
+            rqt_rule_free(level->rule);
+            level->rule = NULL;
+        }
+    }
+    *options = options_of(t, tile.level);
+    return code == SQLITE_OK ? force_corners(t, tile, level->rule) : code;
 }
 
 /* The north-western corner of a cell, its side so large a part of the cell's. */
@@ -71,10 +99,12 @@ static int make_corner(const tiles *t, block_tile tile, int32_t part, rqt_region
 
 static int query(tiles *t, block_tile tile, const rqt_region *region, rqt_patch *patch, char **error) {
     store_query_options options;
-    const int code = begin_query(t, tile, &options);
-    return code != SQLITE_OK ? code
-                             : store_query(t->store, t->terrain, region, block_plan_of(t)->level[tile.level].error,
-                                           &options, patch, NULL, error);
+    int code = begin_query(t, tile, &options, error);
+    if (code == SQLITE_OK)
+        code = store_query(t->store, t->terrain, region, block_plan_of(t)->level[tile.level].error, &options, patch,
+                           NULL, error);
+    if (code == SQLITE_OK) (void)seam_merge(t, &block_plan_of(t)->seam, patch);
+    return code;
 }
 
 /* A block is walked whole before it is asked whether that is enough: a corner takes less, and most have one. */
@@ -84,7 +114,7 @@ static int probe(tiles *t, block_tile tile, bool *has, char **error) {
         store_query_options options;
         rqt_region *region = NULL;
         if (part > 1 << (t->terrain->lattice.K - tile.level)) continue;
-        code = begin_query(t, tile, &options);
+        code = begin_query(t, tile, &options, error);
         if (code == SQLITE_OK) code = make_corner(t, tile, part, &region);
         if (code == SQLITE_OK)
             code = tiles_has_triangle(t, region, block_plan_of(t)->level[tile.level].error, &options, has, error);
@@ -98,7 +128,7 @@ int block_has_triangle(tiles *t, block_tile tile, bool *has, char **error) {
     const int32_t box[4] = {cell.from.x, cell.to.x, cell.from.y, cell.to.y};
     store_cover cover = STORE_COVER_UNKNOWN;
     store_query_options options;
-    int code = begin_query(t, tile, &options);
+    int code = begin_query(t, tile, &options, error);
     if (code == SQLITE_OK)
         code = store_covers(t->store, t->terrain, box, block_plan_of(t)->level[tile.level].error, &options, &cover,
                             error);
@@ -106,15 +136,31 @@ int block_has_triangle(tiles *t, block_tile tile, bool *has, char **error) {
     return code == SQLITE_OK && cover == STORE_COVER_UNKNOWN ? probe(t, tile, has, error) : code;
 }
 
-int block_mesh_around(tiles *t, block_tile tile, rqt_patch *patch, char **error) {
+/* Where those triangles lie. Returns how many boxes. */
+static int list_boxes(const tiles *t, block_tile tile, int part, double boxes[4][4]) {
     const block_cell cell = block_cell_of(t, tile);
     const double x0 = cell.from.x, x1 = cell.to.x, y0 = cell.from.y, y1 = cell.to.y, wide = RIM;
+    const int32_t last = t->terrain->lattice.width - 1;
     const double rim[4][4] = {{x0 - wide, x1 + wide, y0 - wide, y0},
                               {x0 - wide, x0, y0, y1},
                               {x1, x1 + wide, y0, y1},
                               {x0 - wide, x1 + wide, y1, y1 + wide}};
+    const double ends[2][4] = {{last - wide, last, y0 - wide, y1 + wide}, {0, wide, y0 - wide, y1 + wide}};
+    if (part == AROUND_CELL) {
+        memcpy(boxes, rim, sizeof rim);
+        return 4;
+    }
+    if (!block_plan_of(t)->seam.q || (part == AT_LAST_COLUMN ? cell.from.x > 0 : cell.to.x < last)) return 0;
+    memcpy(boxes, ends[part == AT_FIRST_COLUMN], sizeof ends[0]);
+    return 1;
+}
+
+int block_mesh_around(tiles *t, block_tile tile, int part, rqt_patch *patch, char **error) {
+    double boxes[4][4];
     rqt_region *region = NULL;
-    int code = tiles_region(t, rim, 4, &region);
+    const int count = list_boxes(t, tile, part, boxes);
+    if (count == 0) return SQLITE_OK;
+    int code = tiles_region(t, boxes, count, &region);
     for (int n = 0; n < 9 && code == SQLITE_OK; n++) {
         const block_tile near = {tile.level, tile.i + n % 3 - 1, tile.j + n / 3 - 1};
         if (block_exists(t, near)) code = force_corners(t, near, block_plan_of(t)->level[tile.level].rule);
@@ -129,6 +175,12 @@ int block_mesh_around(tiles *t, block_tile tile, rqt_patch *patch, char **error)
 typedef struct angles {
     earth_angles lon, lat;
 } angles;
+
+double block_longitude(const tiles *t, int32_t col) {
+    const rqt_placement *at = &t->terrain->placement;
+    const bool is_first = block_plan_of(t)->seam.q && col == t->terrain->lattice.width - 1;
+    return is_first ? at->x0 : at->x0 + col * at->dx;
+}
 
 static double latitude(const rqt_placement *at, int32_t row) {
     const double degrees = at->y0 + row * at->dy;
@@ -153,7 +205,7 @@ static int place_all(const tiles *t, const rqt_patch *patch, double *xyz, char *
     earth_angles_clear(&known->lat);
     for (size_t i = 0; i < patch->vertex_count && code == SQLITE_OK; i++) {
         const rqt_patch_vertex *v = &patch->vertices[i];
-        const earth_angle *lon = earth_angle_of(&known->lon, v->col, at->x0 + v->col * at->dx),
+        const earth_angle *lon = earth_angle_of(&known->lon, v->col, block_longitude(t, v->col)),
                           *lat = earth_angle_of(&known->lat, v->row, latitude(at, v->row));
         code = place_vertex(t, v, lon, lat, xyz + 3 * i, error);
     }

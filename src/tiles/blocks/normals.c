@@ -1,6 +1,7 @@
 /* normals.c - normals of a tile's vertices, in space.
  *
- * On the last level, whose mesh has all samples, they are those of the full-resolution grid (store_normals).
+ * On the last level, whose mesh has all samples, they are those of the full-resolution grid (store_normals); where
+ * the terrain closes, the mean of both columns'.
  *
  * On the others the normal at a vertex is that of its star, the triangles of the level's mesh that have it: the sum
  * of their area vectors, which is the mean of their normals by area. Surfaces with the same rim have the same sum
@@ -10,8 +11,9 @@
  * of the last level for a tile of the first.
  *
  * A star is of the level's mesh and not of a tile: at the sides of a cell it has triangles of the cells next to
- * it, asked for along a rim. Places are whole steps, fewer than 2^24 for what two places of a triangle differ by,
- * so area vectors and their sums are exact in doubles, in whatever order: both tiles have the same one.
+ * it, asked for along a rim, and where the terrain closes those at its other end. Places are whole steps, fewer
+ * than 2^24 for what two places of a triangle differ by, so area vectors and their sums are exact in doubles, in
+ * whatever order: both tiles have the same one.
  */
 #include "blocks.h"
 #include "earth.h"
@@ -33,25 +35,51 @@ typedef struct angles {
     earth_angles lon, lat;
 } angles;
 
+/* Where the terrain closes: a vertex of one column, as one of the other. */
+static bool find_twin(const tiles *t, const rqt_patch_vertex *v, rqt_patch_vertex *twin) {
+    const int32_t last = t->terrain->lattice.width - 1;
+    *twin = *v;
+    twin->col = v->col == 0 ? last : 0;
+    return block_plan_of(t)->seam.q && (v->col == 0 || v->col == last);
+}
+
+/* The mesh's vertices, and behind them their twins, in the same order. */
+static int list_samples(const tiles *t, const rqt_patch *patch, rqt_patch *samples) {
+    const size_t count = patch->vertex_count;
+    samples->vertices = sqlite3_malloc64(2 * count * sizeof *samples->vertices);
+    if (!samples->vertices) return SQLITE_NOMEM;
+    memcpy(samples->vertices, patch->vertices, count * sizeof *samples->vertices);
+    samples->vertex_count = count;
+    for (size_t i = 0; i < count; i++)
+        if (find_twin(t, &patch->vertices[i], &samples->vertices[samples->vertex_count])) samples->vertex_count++;
+    return SQLITE_OK;
+}
+
 static int take_full_resolution(tiles *t, block_mesh *mesh, char **error) {
     const rqt_placement *at = &t->terrain->placement;
+    const size_t count = mesh->patch.vertex_count;
     angles *known = sqlite3_malloc64(sizeof *known);
+    rqt_patch samples = {0};
     float *enu = NULL;
-    int code = known ? store_normals(t->store, t->terrain, &mesh->patch, &enu, error) : SQLITE_NOMEM;
+    int code = known ? list_samples(t, &mesh->patch, &samples) : SQLITE_NOMEM;
+    if (code == SQLITE_OK) code = store_normals(t->store, t->terrain, &samples, &enu, error);
     if (code == SQLITE_OK) {
         earth_angles_clear(&known->lon);
         earth_angles_clear(&known->lat);
     }
-    for (size_t i = 0; i < mesh->patch.vertex_count && code == SQLITE_OK; i++) {
+    const float *twins = enu + 3 * count;
+    for (size_t i = 0; i < count && code == SQLITE_OK; i++) {
         const rqt_patch_vertex *v = &mesh->patch.vertices[i];
-        const float *n = enu + 3 * i;
-        double normal[3];
-        earth_turn(earth_angle_of(&known->lon, v->col, at->x0 + v->col * at->dx),
-                   earth_angle_of(&known->lat, v->row, at->y0 + v->row * at->dy),
-                   (const double[3]){(double)n[0], (double)n[1], (double)n[2]}, normal);
+        rqt_patch_vertex twin;
+        double n[3], normal[3];
+        const bool has_twin = find_twin(t, v, &twin);
+        for (int k = 0; k < 3; k++) n[k] = (double)enu[3 * i + (size_t)k] + (has_twin ? (double)*twins++ : 0);
+        earth_turn(earth_angle_of(&known->lon, v->col, block_longitude(t, v->col)),
+                   earth_angle_of(&known->lat, v->row, at->y0 + v->row * at->dy), n, normal);
         round_normal(normal, mesh->normal + 3 * i);
     }
     sqlite3_free(enu);
+    sqlite3_free(samples.vertices);
     sqlite3_free(known);
     return code;
 }
@@ -107,8 +135,14 @@ static uint32_t find_side(const side_list *sides, int32_t col, int32_t row) {
     return found ? found->vertex : OTHER;
 }
 
-/* around: the patch of block_mesh_around. */
-static int add_around(const tiles *t, block_tile tile, const block_mesh *mesh, const rqt_patch *around,
+/* The vertex of the tile that is the same as one of a part of block_mesh_around, or OTHER. */
+static uint32_t find_own(const tiles *t, const side_list *sides, int part, const rqt_patch_vertex *v) {
+    const int32_t last = t->terrain->lattice.width - 1;
+    if (part == AROUND_CELL) return find_side(sides, v->col, v->row);
+    return v->col == (part == AT_LAST_COLUMN ? last : 0) ? find_side(sides, last - v->col, v->row) : OTHER;
+}
+
+static int add_around(const tiles *t, block_tile tile, const block_mesh *mesh, int part, const rqt_patch *around,
                       const int32_t *offset, double *sums) {
     const size_t count = around->vertex_count;
     side_list sides = {.items = sqlite3_malloc64((mesh->patch.vertex_count + 1) * sizeof *sides.items)};
@@ -116,8 +150,7 @@ static int add_around(const tiles *t, block_tile tile, const block_mesh *mesh, c
     const int code = sides.items && own ? SQLITE_OK : SQLITE_NOMEM;
     if (code == SQLITE_OK) {
         list_sides(t, tile, &mesh->patch, &sides);
-        for (size_t i = 0; i < count; i++)
-            own[i] = find_side(&sides, around->vertices[i].col, around->vertices[i].row);
+        for (size_t i = 0; i < count; i++) own[i] = find_own(t, &sides, part, &around->vertices[i]);
         for (size_t i = 0; i < around->triangle_count; i++) {
             const uint32_t *corner = around->triangles + 3 * i;
             double n[3];
@@ -131,14 +164,14 @@ static int add_around(const tiles *t, block_tile tile, const block_mesh *mesh, c
     return code;
 }
 
-static int sum_around(tiles *t, block_tile tile, block_mesh *mesh, double *sums, char **error) {
+static int sum_around(tiles *t, block_tile tile, block_mesh *mesh, int part, double *sums, char **error) {
     rqt_patch around = {0};
     int32_t *offset = NULL;
-    int code = block_mesh_around(t, tile, &around, error);
+    int code = block_mesh_around(t, tile, part, &around, error);
     if (code == SQLITE_OK)
         code =
             block_places(t, &around, block_plan_of(t)->level[tile.level].step, mesh->origin, true, &offset, error);
-    if (code == SQLITE_OK) code = add_around(t, tile, mesh, &around, offset, sums);
+    if (code == SQLITE_OK) code = add_around(t, tile, mesh, part, &around, offset, sums);
     sqlite3_free(offset);
     store_keep(t->store, &around);
     return code;
@@ -163,7 +196,9 @@ static int take_stars(tiles *t, block_tile tile, block_mesh *mesh, char **error)
         area_vector(mesh->offset, corner, n);
         for (int c = 0; c < 3; c++) add(sums + 3 * (size_t)corner[c], n);
     }
-    const int code = sum_around(t, tile, mesh, sums, error);
+    int code = SQLITE_OK;
+    for (int part = 0; part < BLOCK_PARTS && code == SQLITE_OK; part++)
+        code = sum_around(t, tile, mesh, part, sums, error);
     for (size_t i = 0; i < count && code == SQLITE_OK; i++) {
         double *n = sums + 3 * i;
         if (n[0] == 0 && n[1] == 0 && n[2] == 0) take_ellipsoid(t, tile, mesh, mesh->offset + 3 * i, n);

@@ -85,7 +85,7 @@ static void set_levels(const store_terrain *t, const rqt_code largest[RQT_MAX_K 
         /* Half of it to either side, and the origin may be off the middle by half a metre or a step. */
         while ((size_of_tiles(t, &e, l) / 2 + 2 + 2 * level->step) / level->step >= ldexp(1, STEP_BITS))
             level->step *= 2;
-        level->round = level->step * sqrt(3) / 2 * (1 + 1e-9) + DOUBLES;
+        level->round = level->step * sqrt(3) / 2 * (1 + 1e-9) + DOUBLES + plan->seam.merging;
     }
 }
 
@@ -119,6 +119,7 @@ int block_plan_create(tiles *t, void **out, char **error) {
     if (!plan) return SQLITE_NOMEM;
     *plan = (block_plan){.finest = terrain->lattice.K - terrain->k};
     code = make_frame(terrain, is_above_geoid, plan, error);
+    if (code == SQLITE_OK) code = seam_read(t, &plan->seam, error);
     if (code == SQLITE_OK) {
         set_levels(terrain, largest, plan);
         *out = plan;
@@ -135,5 +136,6 @@ void block_plan_free(void *made) {
     for (int l = 0; l < TILES_LEVELS; l++) rqt_rule_free(plan->level[l].rule);
     for (int series = 0; series < BLOCK_SERIES; series++)
         for (int l = 0; l < TILES_LEVELS; l++) sqlite3_free(plan->ranges[series][l]);
+    seam_free(&plan->seam);
     sqlite3_free(plan);
 }
