@@ -24,6 +24,8 @@ MUTANTS = [
     ("3d-tiles: stars end at the sides of tiles", NORMALS, "part = 0; part < BLOCK_PARTS", "part = 1; part < BLOCK_PARTS", TILES, "stars'"),
     ("3d-tiles: cells next to a tile's are not those of its level", MESH, "if (block_exists(t, near)) code", "if (n == 4) code", TILES, "stars'"),
     ("3d-tiles: at a pole normals are nowhere", NORMALS, "n[2] *= (EARTH_A / EARTH_B) * (EARTH_A / EARTH_B);", "n[2] = 0;", TILES, "stars'"),
+    ("3d-tiles: around the Earth a seam is left open", MESH, "if (code == SQLITE_OK && plan->seam.q) code", "if (code == SQLITE_OK && plan->seam.q && !error) code", TILES, "both ends are one"),
+    ("3d-tiles: stars end where the terrain closes", NORMALS, "part = 0; part < BLOCK_PARTS", "part = 0; part < 1", TILES, "both ends are one"),
     # places
     ("3d-tiles: rows count from the north", TILE, "(INT64_C(1) << level) - 1 - y", "y", TILES, "as the formats have them"),
     ("3d-tiles: regions do not sink with their chords", TILE, "region[4] = relief->lowest + low - moved;", "region[4] = relief->lowest + low;", TILES, "lie in their regions"),
