@@ -17,7 +17,7 @@ MUTANTS = [
     ("3d-tiles: the root's error is its own", TILESET, "most = fmax(most, ldexp(", "most = fmax(most, ldexp(l > 0 ? 0 : 1, 0) * (", TILES, "halved level by level"),
     # seams
     ("3d-tiles: corners are not forced", MESH, "corner < 4 && status", "corner < 0 && status", TILES, "covers its cell"),
-    ("3d-tiles: places are rounded from each tile's origin on", MESH, "(int32_t)(rint(xyz[3 * i + k] / step) - from[k]);", "(int32_t)rint(xyz[3 * i + k] / step - from[k] - 0.3 * (double)(count % 3));", TILES, "within half a step"),
+    ("3d-tiles: places are rounded from each tile's origin on", MESH, "(int32_t)(rint(xyz[3 * i + k] * steps) - from[k]);", "(int32_t)rint(xyz[3 * i + k] * steps - from[k] - 0.3 * (double)(count % 3));", TILES, "within half a step"),
     ("3d-tiles: origins are between steps", MESH, "origin[k] = rint((low[k] + high[k]) / 2 / unit) * unit + 0.0;", "origin[k] = (low[k] + high[k]) / 2;", TILES, "within half a step"),
     ("3d-tiles: steps are too fine for floats", PLAN, "while (", "while (level->step < ldexp(1, -12) && ", TILES, "as the formats have them"),
     ("3d-tiles: normals are those of glTF's other axis", GLB, "*p++ = (uint8_t)n[2];", "*p++ = (uint8_t)n[1];", TILES, "normals"),

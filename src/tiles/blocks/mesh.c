@@ -235,9 +235,9 @@ int block_places(const tiles *t, const rqt_patch *patch, double step, double *or
     *offset = sqlite3_malloc64((3 * count + 1) * sizeof **offset);
     int code = xyz && *offset ? place_all(t, patch, xyz, error) : SQLITE_NOMEM;
     if (code == SQLITE_OK && !has_origin) choose_origin(xyz, count, step, origin);
-    const double from[3] = {origin[0] / step, origin[1] / step, origin[2] / step};
+    const double steps = 1 / step, from[3] = {origin[0] * steps, origin[1] * steps, origin[2] * steps};
     for (size_t i = 0; i < count && code == SQLITE_OK; i++)
-        for (size_t k = 0; k < 3; k++) (*offset)[3 * i + k] = (int32_t)(rint(xyz[3 * i + k] / step) - from[k]);
+        for (size_t k = 0; k < 3; k++) (*offset)[3 * i + k] = (int32_t)(rint(xyz[3 * i + k] * steps) - from[k]);
     sqlite3_free(xyz);
     return code;
 }
