@@ -18,7 +18,6 @@
 #include <string.h>
 
 #define BEYOND_POLE (90 * (1 + 1e-9)) /* a row at a pole, by a rounding */
-enum { CORNER = 16 };                 /* of a side, one part */
 #define RIM 0.5                       /* samples: any triangle at a side meets it */
 
 /* ---------------------------------------------------------------------------------------------------- mesh -- */
@@ -89,10 +88,9 @@ static int begin_query(tiles *t, block_tile tile, store_query_options *options, 
     return code == SQLITE_OK ? force_corners(t, tile, level->rule) : code;
 }
 
-/* The north-western corner of a cell, its side so large a part of the cell's. */
-static int make_corner(const tiles *t, block_tile tile, int32_t part, rqt_region **region) {
+static int make_region(const tiles *t, block_tile tile, rqt_region **region) {
     const int32_t side = 1 << (t->terrain->lattice.K - tile.level);
-    const rqt_square square = {tile.i * side, tile.j * side, side / part};
+    const rqt_square square = {tile.i * side, tile.j * side, side};
     const rqt_status status = rqt_region_of_squares(&square, 1, &t->terrain->lattice, store_allocator(), region);
     return status == RQT_OK ? SQLITE_OK : SQLITE_NOMEM;
 }
@@ -107,33 +105,15 @@ static int query(tiles *t, block_tile tile, const rqt_region *region, rqt_patch 
     return code;
 }
 
-/* A block is walked whole before it is asked whether that is enough: a corner takes less, and most have one. */
-static int probe(tiles *t, block_tile tile, bool *has, char **error) {
-    int code = SQLITE_OK;
-    for (int32_t part = CORNER; part > 0 && code == SQLITE_OK && !*has; part = part > 1 ? 1 : 0) {
-        store_query_options options;
-        rqt_region *region = NULL;
-        if (part > 1 << (t->terrain->lattice.K - tile.level)) continue;
-        code = begin_query(t, tile, &options, error);
-        if (code == SQLITE_OK) code = make_corner(t, tile, part, &region);
-        if (code == SQLITE_OK)
-            code = tiles_has_triangle(t, region, block_plan_of(t)->level[tile.level].error, &options, has, error);
-        rqt_region_free(region);
-    }
-    return code;
-}
-
 int block_has_triangle(tiles *t, block_tile tile, bool *has, char **error) {
     const block_cell cell = block_cell_of(t, tile);
     const int32_t box[4] = {cell.from.x, cell.to.x, cell.from.y, cell.to.y};
-    store_cover cover = STORE_COVER_UNKNOWN;
+    rqt_block_number last = 0;
     store_query_options options;
-    int code = begin_query(t, tile, &options, error);
-    if (code == SQLITE_OK)
-        code = store_covers(t->store, t->terrain, box, block_plan_of(t)->level[tile.level].error, &options, &cover,
-                            error);
-    *has = cover == STORE_COVER_ALL;
-    return code == SQLITE_OK && cover == STORE_COVER_UNKNOWN ? probe(t, tile, has, error) : code;
+    const int code = begin_query(t, tile, &options, error);
+    return code == SQLITE_OK
+               ? tiles_has_triangle(t, box, block_plan_of(t)->level[tile.level].error, &options, &last, has, error)
+               : code;
 }
 
 /* Where those triangles lie. Returns how many boxes. */
@@ -245,7 +225,7 @@ int block_places(const tiles *t, const rqt_patch *patch, double step, double *or
 int block_mesh_make(tiles *t, block_tile tile, block_mesh *mesh, char **error) {
     rqt_region *region = NULL;
     *mesh = (block_mesh){0};
-    int code = make_corner(t, tile, 1, &region);
+    int code = make_region(t, tile, &region);
     if (code == SQLITE_OK) code = query(t, tile, region, &mesh->patch, error);
     rqt_region_free(region);
     if (code != SQLITE_OK || mesh->patch.triangle_count == 0) return code;
