@@ -260,7 +260,7 @@ verify-views: ## rqt_view_verify over 200 cameras on every DEM of DATA=dir, and 
 	@RQT=$(BUILD)/rqt RQT_SO=$(BUILD)/rqt.so /usr/bin/python3 tests/bench/verify_views.py $(DATA)
 
 .PHONY: verify-tiles
-verify-tiles: ## every tile of every level of every DEM of DATA=dir, decoded, beside the raster at every sample; the service too: tables
+verify-tiles: ## every tile of every level of every DEM of DATA=dir (KIND=3d-tiles: only those), decoded, beside the raster at every sample; the service too: tables
 	@./src/install-packages.sh build test
 	@$(MAKE) --no-print-directory -j2 products $(BUILD)/tests/verify_tiles
 	@BUILD=$(BUILD) RQT=$(BUILD)/rqt RQT_SO=$(BUILD)/rqt.so /usr/bin/python3 tests/verify_tiles.py $(DATA)

@@ -202,6 +202,14 @@ std::vector<Spot> Judge::find_samples(Place p, const Cell &cell, const Surface &
             cell.c1 - cell.c0 > turn - 0.1 && std::min(std::fabs(col - cell.c0), std::fabs(col - cell.c1)) < 0.1;
         spot.col = spot.at_pole ? cell.c0 : (int)std::rint(col);
         spot.row = (int)std::rint((g.y - raster.y0) / raster.dy);
+        if (spot.at_seam) { /* the end that has this height */
+            const auto off_of = [&](int c) {
+                return cell.holds(c, spot.row) && raster.is_valid(c, spot.row)
+                           ? length(v - raster.place(c, spot.row))
+                           : HUGE_VAL;
+            };
+            spot.col = off_of(cell.c0) <= off_of(cell.c1) ? cell.c0 : cell.c1;
+        }
         const bool is_there = cell.holds(spot.col, spot.row) && raster.is_valid(spot.col, spot.row);
         const Vec d = is_there ? v - raster.place(spot.col, spot.row) : Vec{};
         verdict.see(vertices, is_there && std::max({std::fabs(d.x), std::fabs(d.y), std::fabs(d.z)}) <= off, [&] {
@@ -371,11 +379,12 @@ void Judge::judge_region(Place p, const Surface &s, const std::vector<Spot> &spo
         within.push_back(look(s.places[i], g));
         if (!is_square) continue;
         const double width = width_of(set.root) / (1 << p.level),
-                     height = (set.root[3] - set.root[1]) / (1 << p.level),
-                     east = east_of(set.root[0] + p.x * width - 1e-9, g.x * RADIAN),
-                     north = g.y * RADIAN - (set.root[1] + p.y * height), off = step / POLE + 1e-9;
+                     height = (set.root[3] - set.root[1]) / (1 << p.level), off = step / POLE + 1e-9,
+                     aside = off / std::max(std::cos(g.y * RADIAN), 1e-9),
+                     east = east_of(set.root[0] + p.x * width - aside, g.x * RADIAN),
+                     north = g.y * RADIAN - (set.root[1] + p.y * height);
         verdict.see(divided,
-                    (spots[i].at_pole || east <= width + 2 * off) && north >= -off && north <= height + off &&
+                    (spots[i].at_pole || east <= width + 2 * aside) && north >= -off && north <= height + off &&
                         g.z >= set.root[4] && g.z <= set.root[5],
                     [&] {
                         return name(p) + ": column " + std::to_string(spots[i].col) + ", row " +
