@@ -18,13 +18,13 @@
  *     edges     neighbours have the same places and normals on the side that they share, and at their corner. Where
  *               voids end at the side only one of them may have ground: then no vertex of it lies on an edge of the
  *               other
- *     normals   within a degree of the raster's central differences in space
- *     regions   vertices, the middles of triangles and of their sides, and regions of children lie in them; the
- *               root's, divided again and again, has the vertices of each tile
- *     errors    do not grow from a tile to its children; clients without metadata reckon with no less; a content
- *               tells its tile's
- *     tiles     are the cells that have a part of the raster, in all levels
- *     listed    contents and subtrees that availability tells are the files that there are
+ *     skirt     what hangs from the sides that neighbours have, as a second surface: upper ends are the ground's
+ * own vertices and normals, lower ones no further down than the content says, and twice what the tile states at
+ * least, in the region normals   within a degree of the raster's central differences in space regions   vertices,
+ * the middles of triangles and of their sides, and regions of children lie in them; the root's, divided again and
+ * again, has the vertices of each tile errors    do not grow from a tile to its children; clients without metadata
+ * reckon with no less; a content tells its tile's tiles     are the cells that have a part of the raster, in all
+ * levels listed    contents and subtrees that availability tells are the files that there are
  */
 #include "verify_tiles_implicit.h"
 
@@ -61,7 +61,7 @@ struct Summary {
 };
 
 struct LevelFigures {
-    size_t tiles = 0, bare = 0, vertices = 0, triangles = 0, samples = 0, sides = 0;
+    size_t tiles = 0, bare = 0, vertices = 0, triangles = 0, samples = 0, sides = 0, skirts = 0;
     double states = 0, metres = 0, space = 0, normal = 0;
 };
 
@@ -122,11 +122,18 @@ class Judge {
     void judge_poles(Place p, const Cell &cell, const Tree &tree, double error);
     void judge_normals(Place p, const Surface &s, const std::vector<Spot> &spots);
     void judge_region(Place p, const Surface &s, const std::vector<Spot> &spots, const Region &region, double step);
+    void judge_skirt(Place p, const ImplicitTile &info, const Cell &cell, const Gltf &gltf,
+                     const std::vector<Spot> &spots);
     void summarise(Place p, const Cell &cell, const Surface &s, const std::vector<Spot> &spots);
     void judge_cover(int l);
     void judge_neighbours();
     void judge_corner(Place p, Place other, const Summary &mine, int up);
 
+    /* Is a vertex on a side of its cell? */
+    static bool is_on_side(const Spot &spot, const Cell &cell, int k) {
+        if (k == NORTH || k == SOUTH) return spot.row == (k == NORTH ? cell.r0 : cell.r1);
+        return !spot.at_pole && spot.col == (k == WEST ? cell.c0 : cell.c1);
+    }
     static std::string name(Place p) { return name_of(p.level, p.x, p.y); }
     Cell cell_of(Place p) const {
         const int wide = side >> p.level, first = ((1 << p.level) - 1 - p.y) * wide;
@@ -409,11 +416,7 @@ void Judge::summarise(Place p, const Cell &cell, const Surface &s, const std::ve
     for (int k = 0; k < SIDES; k++) {
         const bool upright = k == WEST || k == EAST;
         const auto along = [&](uint32_t v) { return upright ? spots[v].row : spots[v].col; };
-        const auto is_there = [&](uint32_t v) {
-            const Spot &spot = spots[v];
-            return upright ? !spot.at_pole && spot.col == (k == WEST ? cell.c0 : cell.c1)
-                           : spot.row == (k == NORTH ? cell.r0 : cell.r1);
-        };
+        const auto is_there = [&](uint32_t v) { return is_on_side(spots[v], cell, k); };
         for (uint32_t v = 0; v < spots.size(); v++)
             if (is_there(v)) summary.sides[k].push_back({along(v), s.places[v], s.normals[v]});
         std::sort(summary.sides[k].begin(), summary.sides[k].end());
@@ -476,19 +479,78 @@ void Judge::judge_neighbours() {
     }
 }
 
+/* Vertices come in pairs: one of the ground, and the one below. */
+void Judge::judge_skirt(Place p, const ImplicitTile &info, const Cell &cell, const Gltf &gltf,
+                        const std::vector<Spot> &spots) {
+    Promise &hangs = verdict.of("skirt: it hangs from the ground's sides, as far as it says");
+    Promise &all = verdict.of("skirt: all edges of sides that neighbours have");
+    const Surface &ground = gltf.surfaces[0], &skirt = gltf.surfaces[1];
+    const double round = gltf.step * 1.8; /* two ends, half a diagonal each */
+    std::map<std::array<double, 6>, uint32_t> tops;
+    std::vector<uint32_t> top_of;
+    std::set<std::pair<uint32_t, uint32_t>> edges;
+    const auto key_of = [](const Surface &s, uint32_t i) {
+        const Vec a = s.places[i], n = s.normals[i];
+        return std::array<double, 6>{a.x, a.y, a.z, n.x, n.y, n.z};
+    };
+    for (uint32_t i = 0; i < spots.size(); i++)
+        for (int k = 0; k < SIDES; k++)
+            if (is_on_side(spots[i], cell, k)) tops[key_of(ground, i)] = i;
+    for (uint32_t i = 0; i < skirt.places.size(); i++) {
+        const auto found = tops.find(key_of(skirt, i - i % 2));
+        const bool is_there = found != tops.end() && skirt.places.size() % 2 == 0;
+        const auto where = [&] { return name(p) + ": vertex " + std::to_string(i) + " of the skirt"; };
+        verdict.see(hangs, is_there, where);
+        if (!is_there) return;
+        top_of.push_back(found->second);
+        if (i % 2 == 0) continue;
+        const Vec at = reverse(skirt.places[i]), above = spots[found->second].geodetic;
+        const Angle lon(above.x), lat(above.y);
+        const Vec up = {lat.cosine * lon.cosine, lat.cosine * lon.sine, lat.sine},
+                  d = skirt.places[i - 1] - skirt.places[i];
+        const double down = dot(d, up), aside = length(d - up * down);
+        verdict.see(hangs,
+                    down <= skirt.skirt + round && down >= std::min(2 * info.error, POLE / 2) - round &&
+                        aside <= down + round && at.z >= info.region[4] && at.y * RADIAN >= info.region[1] &&
+                        at.y * RADIAN <= info.region[3],
+                    [&] {
+                        return where() + " is " + std::to_string(down) + " m down, it says " +
+                               std::to_string(skirt.skirt);
+                    });
+    }
+    for (size_t i = 0; i < skirt.triangles.size(); i++) {
+        const uint32_t a = skirt.triangles[i], b = skirt.triangles[i % 3 == 2 ? i - 2 : i + 1];
+        if (a % 2 == 0 && b % 2 == 0) edges.insert(std::minmax(top_of[a], top_of[b]));
+    }
+    const Place beside[SIDES] = {
+        {p.level, p.x - 1, p.y}, {p.level, p.x, p.y - 1}, {p.level, p.x + 1, p.y}, {p.level, p.x, p.y + 1}};
+    for (int k = 0; k < SIDES; k++) {
+        if (set.tiles.count(beside[k]) == 0) continue;
+        for (size_t i = 0; i < ground.triangles.size(); i++) {
+            const uint32_t a = ground.triangles[i], b = ground.triangles[i % 3 == 2 ? i - 2 : i + 1];
+            if (is_on_side(spots[a], cell, k) && is_on_side(spots[b], cell, k))
+                verdict.see(all, edges.count(std::minmax(a, b)) == 1,
+                            [&] { return name(p) + ", side " + std::to_string(k); });
+        }
+    }
+}
+
 /* --------------------------------------------------------------------------------------------------- whole -- */
 
 void Judge::judge_tile(Place p, const ImplicitTile &info) {
-    Promise &format = verdict.of("format: every content is as glTF 2.0 has it, of one surface");
+    Promise &format = verdict.of("format: every content is as glTF 2.0 has it, of one surface and its skirt");
     Promise &told = verdict.of("errors: a content tells its tile's, and its level");
     const Gltf gltf(read_file(folder + "/" + set.content(p)));
-    verdict.see(format, gltf.problem.empty() && gltf.surfaces.size() == 1,
+    const std::vector<Surface> &all = gltf.surfaces;
+    const bool is_ground = !all.empty() && std::isnan(all[0].skirt),
+               has_skirt = all.size() == 2 && all[1].skirt > 0;
+    verdict.see(format, gltf.problem.empty() && is_ground && (all.size() == 1 || has_skirt),
                 [&] { return name(p) + ": " + gltf.problem; });
     if (!gltf.problem.empty()) return;
     verdict.see(told, gltf.error == info.error && gltf.level == p.level, [&] {
         return name(p) + ": " + std::to_string(gltf.error) + ", level " + std::to_string(gltf.level);
     });
-    const Surface &s = gltf.surfaces[0];
+    const Surface &s = all[0];
     const Cell cell = cell_of(p);
     figures.vertices += s.places.size();
     figures.triangles += s.triangles.size() / 3;
@@ -498,6 +560,8 @@ void Judge::judge_tile(Place p, const ImplicitTile &info) {
     judge_normals(p, s, spots);
     judge_region(p, s, spots, info.region, gltf.step);
     summarise(p, cell, s, spots);
+    if (has_skirt) judge_skirt(p, info, cell, gltf, spots);
+    figures.skirts += has_skirt;
 }
 
 void Judge::judge_level(int l) {
@@ -512,9 +576,9 @@ void Judge::judge_level(int l) {
     }
     judge_cover(l);
     judge_neighbours();
-    std::printf("| %d | %zu | %zu | %zu | %zu | %zu | %.3f | %.3f | %.4f | %zu | %.2f |\n", l, figures.tiles,
+    std::printf("| %d | %zu | %zu | %zu | %zu | %zu | %.3f | %.3f | %.4f | %zu | %zu | %.2f |\n", l, figures.tiles,
                 figures.bare, figures.vertices, figures.triangles, figures.samples, figures.states, figures.metres,
-                figures.space, figures.sides, figures.normal);
+                figures.space, figures.sides, figures.skirts, figures.normal);
     std::fflush(stdout);
 }
 
@@ -526,8 +590,8 @@ bool Judge::run() {
     judge_tileset();
     std::printf(
         "| level | tiles | without content | vertices | triangles | samples covered | states at most, m | worst in "
-        "space, m | of what it states | sides | normals |\n");
-    std::printf("|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n");
+        "space, m | of what it states | sides | skirts | normals |\n");
+    std::printf("|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n");
     for (int l = 0; l < set.levels; l++) judge_level(l);
     std::printf("\n");
     return verdict.report();

@@ -15,6 +15,7 @@
 struct Surface {
     std::vector<Vec> places, normals;
     std::vector<uint32_t> triangles; /* three a triangle */
+    double skirt = NAN;              /* metres: walls that hang down so far; else it is ground */
 };
 
 /* A member of an object, or of a list; NULL: there is none. */
@@ -206,6 +207,7 @@ class Gltf {
             if (i < 0 || i >= (double)s.places.size()) return fail("an index that is no vertex");
             s.triangles.push_back((uint32_t)i);
         }
+        s.skirt = number_of(member(primitive, "extras"), "skirt", NAN);
         surfaces.push_back(s);
     }
 };

@@ -68,6 +68,12 @@ class Judge {
     int first = 0, last = -1;
     std::vector<double> steps;
     Verdict verdict;
+    /* Of each pixel or sample. */
+    Promise &heights = verdict.of("heights: pixels as large as samples have the ground's, to half a step");
+    Promise &holes = verdict.of("voids: pixels have none where a corner of their half cell is void");
+    Promise &outside = verdict.of("voids: pixels have no height beyond the raster");
+    Promise &near = verdict.of("voids: pixels have a height where no void is near, none where all is void");
+    Promise &error = verdict.of("error: no sample is further from what is drawn than its tile says");
     std::map<Key, Picture> level;
     LevelFigures figures;
 
@@ -156,11 +162,11 @@ bool Judge::read_picture(const std::string &path, Picture &picture) {
     for (int band = 0; band < 3 && ok; band++)
         ok = GDALRasterIO(GDALGetRasterBand(source, band + 1), GF_Read, 0, 0, PIXELS, PIXELS, rgb[band], PIXELS,
                           PIXELS, GDT_Byte, 0, 0) == CE_None;
-    const char *error = GDALGetMetadataItem(source, "error_metres", nullptr),
+    const char *states = GDALGetMetadataItem(source, "error_metres", nullptr),
                *voids = GDALGetMetadataItem(source, "void_pixels", nullptr);
-    ok = ok && error && voids;
+    ok = ok && states && voids;
     if (ok) {
-        picture.states = std::atof(error);
+        picture.states = std::atof(states);
         picture.voids = std::atol(voids);
         for (size_t i = 0; i < (size_t)PIXELS * PIXELS; i++)
             picture.codes.push_back(rgb[0][i] << 16 | rgb[1][i] << 8 | rgb[2][i]);
@@ -210,7 +216,6 @@ void Judge::judge_samples(int z) {
 }
 
 void Judge::judge_row(int z, int r, double y, const std::vector<Between> &columns, const std::vector<int> &used) {
-    Promise &error = verdict.of("error: no sample is further from what is drawn than its tile says");
     std::vector<int> rows;
     const Between row = between(y, (long)PIXELS << z, false, rows);
     std::vector<const int32_t *> upper, lower;
@@ -253,7 +258,6 @@ void Judge::judge_row(int z, int r, double y, const std::vector<Between> &column
 }
 
 void Judge::judge_errors(int z) {
-    Promise &error = verdict.of("error: no sample is further from what is drawn than its tile says");
     Promise &idle = verdict.of("idle: what is said is no more than twice the truth, a step and a centimetre");
     const double step = steps[(size_t)z];
     for (const auto &[key, picture] : level) {
@@ -273,8 +277,6 @@ void Judge::judge_errors(int z) {
 /* ------------------------------------------------------------------------------------------------- pixels -- */
 
 template <typename Where> void Judge::judge_height(Where where, double c, double r, int32_t code, double step) {
-    Promise &heights = verdict.of("heights: pixels as large as samples have the ground's, to half a step");
-    Promise &voids = verdict.of("voids: pixels have none where a corner of their half cell is void");
     const int x = std::clamp((int)std::floor(c), 0, raster.width - 2),
               y = std::clamp((int)std::floor(r), 0, raster.height - 2);
     const double fx = c - x, fy = r - y;
@@ -304,7 +306,7 @@ template <typename Where> void Judge::judge_height(Where where, double c, double
         if (weight[k] < 4e-6) return; /* on a side of it, or a rounding beside */
         is_void = true;
     }
-    verdict.see(voids, is_void == (code == ZERO),
+    verdict.see(holes, is_void == (code == ZERO),
                 [&] { return where() + (is_void ? " has a height" : " has none"); });
     if (is_void || code == ZERO) return;
     /* The program's places among samples are whole 2^-20. */
@@ -320,8 +322,6 @@ template <typename Where> void Judge::judge_height(Where where, double c, double
 /* reach: samples by which a coarse level's voids may be larger or smaller; 0 on levels of full resolution. */
 template <typename Where>
 void Judge::judge_pixel(Where where, double lon, double lat, int32_t code, double step, double reach) {
-    Promise &outside = verdict.of("voids: pixels have no height beyond the raster");
-    Promise &near = verdict.of("voids: pixels have a height where no void is near, none where all is void");
     const double turn = 360 / raster.dx, r = (lat - raster.y0) / raster.dy;
     double c = (lon - raster.x0) / raster.dx;
     c -= turn * std::floor(c / turn + 1e-12);
