@@ -1,24 +1,14 @@
 /* cut.c - mode `cut`: the patch of a request clipped to its region, for rows, files and the proof. */
 #include "functions.h"
 
-typedef struct waiting {
-    store *store;
-    int code;
-} waiting;
-
-static bool is_interrupted(void *context) {
-    waiting *w = context;
-    return store_is_interrupted(w->store, &w->code);
-}
-
 int request_cut(request *r, rqt_cut *cut, char **error) {
     rqt_patch patch;
     *cut = (rqt_cut){0};
     int code = request_patch(r, RQT_PRODUCT_TRIANGLES, &patch, NULL, error);
     if (code != SQLITE_OK) return code;
-    waiting w = {r->store, SQLITE_INTERRUPT};
+    store_wait w = {r->store, SQLITE_INTERRUPT};
     const rqt_status status =
-        rqt_cut_make(&patch, r->region, &r->terrain->lattice, store_allocator(), is_interrupted, &w, cut);
+        rqt_cut_make(&patch, r->region, &r->terrain->lattice, store_allocator(), store_wait_is_over, &w, cut);
     store_keep(r->store, &patch);
     return status == RQT_OK ? SQLITE_OK : status == RQT_INTERRUPTED ? w.code : SQLITE_NOMEM;
 }

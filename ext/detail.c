@@ -336,17 +336,6 @@ static int read_detail(request *r, char **error) {
     return fail(error, "option \"detail\" must be a list of [geometry as text, eps], or the name of a table");
 }
 
-/* Why a border was not finished. */
-typedef struct waiting {
-    store *store;
-    int code;
-} waiting;
-
-static bool is_interrupted(void *context) {
-    waiting *w = context;
-    return store_is_interrupted(w->store, &w->code);
-}
-
 int rule_read(request *r, char **error) {
     const bool border = r->mode == REQUEST_BORDER;
     if (!r->detail && !border && r->frame_kind == FRAME_CRS && !r->view) return SQLITE_OK;
@@ -362,7 +351,7 @@ int rule_read(request *r, char **error) {
                     option, rqt_metric_name(r->options.metric));
     int code = r->detail ? read_detail(r, error) : SQLITE_OK;
     if (code != SQLITE_OK) return code;
-    waiting w = {r->store, SQLITE_INTERRUPT};
+    store_wait w = {r->store, SQLITE_INTERRUPT};
     rqt_status status =
         rqt_rule_create(&r->terrain->lattice, r->terrain->quantum_error, store_allocator(), &r->options.rule);
     if (status == RQT_OK && r->places)
@@ -370,7 +359,7 @@ int rule_read(request *r, char **error) {
     if (status == RQT_OK && r->view) status = rqt_rule_set_field(r->options.rule, r->view->field);
     if (status == RQT_OK && border) {
         rqt_region_grow_rectangle(r->region);
-        status = rqt_rule_force_border(r->options.rule, r->region, is_interrupted, &w);
+        status = rqt_rule_force_border(r->options.rule, r->region, store_wait_is_over, &w);
     }
     return status == RQT_OK ? SQLITE_OK : status == RQT_INTERRUPTED ? w.code : SQLITE_NOMEM;
 }

@@ -51,7 +51,7 @@ def kill_group(leader):
 
 
 def run_until_named(command, tree, environment, test, is_page):
-    """None when a line says that the test is red, when the program dies and when it hangs; otherwise its exit code.
+    """"" when a line says that the test is red, when the program dies and when it hangs; otherwise what there was instead.
 
     What it would say after that line is not waited for: a code that is not 0 follows. But a page's browser outlives its test when
     that is killed.
@@ -66,14 +66,19 @@ def run_until_named(command, tree, environment, test, is_page):
 
         timer = threading.Timer(LONGEST, end)
         timer.start()
-        is_named = False
+        is_named, others = False, []
         try:
             for line in ran.stdout:
-                is_named |= test in line and ("FAILED" in line or "ERROR" in line or line.startswith("not ok"))
+                if "FAILED" not in line and "ERROR" not in line and not line.startswith("not ok"):
+                    continue
+                is_named |= test in line
+                others.append(line.rstrip())
                 if is_named and not is_page:
                     end()
             code = ran.wait()
-            return None if late.is_set() or code < 0 or (code and is_named) else code
+            if late.is_set() or code < 0 or (code and is_named):
+                return ""
+            return "SURVIVED" if code == 0 else "\n".join(["red, but not " + test, *others[:5]])
         finally:
             timer.cancel()
             kill_group(ran.pid)  # services that it left
@@ -103,8 +108,8 @@ def run_mutant(tree, mutant):
             return "does not build:\n" + made.stderr[-1500:]
         runner = ["node", "--test", "--test-reporter=tap", "--test-name-pattern=" + re.escape(test)] if page else ["/usr/bin/python3", "-u"]
         command = runner + ["tests/" + program] if script else ["build/tests/" + program]
-        code = run_until_named(command, tree, environment, test, page)
-        return "" if code is None else "SURVIVED " + program + (" (red, but not " + test + ")" if code else "")
+        verdict = run_until_named(command, tree, environment, test, page)
+        return verdict and program + ": " + verdict
     finally:
         shutil.copy2(path, target)
         os.utime(target)

@@ -2,7 +2,7 @@
  * beside the triangles of the mesh, clipped to the box here. */
 #include "test_store_support.h"
 
-enum { WIDTH = 61, HEIGHT = 47, BOXES = 40, RULES = 3 };
+enum { WIDTH = 61, HEIGHT = 47, BOXES = 20, RULES = 3 };
 
 static uint64_t seed, state;
 static int below(int n) {
@@ -115,7 +115,7 @@ static void boxes_are_covered_as_the_mesh_covers_them(void **unused) {
     (void)unused;
     static const double eps[] = {0, 4, 12, 20, 30, 45, 70, 110, 200, 400, 1e9};
     tally seen = {0};
-    for (int n = 0; n < 40; n++) {
+    for (int n = 0; n < 120; n++) {
         raster r = make_coast();
         sqlite3 *db = open_database(":memory:");
         store *s;

@@ -156,6 +156,7 @@ static int run(int argc, char **argv) {
     options.databases = (const char *const *)argv + optind;
     options.database_count = argc - optind;
     if (!options.database_count) return cli_usage("a database is missing");
+    sqlite3_config(SQLITE_CONFIG_MEMSTATUS, 1); /* --memory is of what is counted */
     const int status = check_databases(&options);
     if (status != CLI_OK) return status;
     return serve_run(&options, tell, NULL, why, sizeof why) ? CLI_OK : cli_fail("%s", why);

@@ -227,6 +227,11 @@ bool store_is_interrupted(store *s, int *why) {
     return true;
 }
 
+bool store_wait_is_over(void *wait) {
+    store_wait *w = wait;
+    return store_is_interrupted(w->store, &w->code);
+}
+
 bool store_is_enough(const store *s, store_question *question, const rqt_patch *patch) {
     const int64_t most = s->limits.triangles;
     question->over = question->most > 0 && patch->vertex_count > question->most;

@@ -120,6 +120,12 @@ int store_query_within(store *s, const store_terrain *t, const rqt_region *regio
                        store_reads *reads, char **error);
 /* Was sqlite3_interrupt called? *code says how to end. */
 bool store_is_interrupted(store *s, int *code);
+/* The same for functions of the core, which take a function and a context. */
+typedef struct store_wait {
+    store *store;
+    int code; /* how to end */
+} store_wait;
+bool store_wait_is_over(void *wait);
 /* Instead of rqt_patch_free: the store keeps the memory for its next query, up to a limit. */
 void store_keep(store *s, rqt_patch *patch);
 /* What one answer may be at most, for those who answer strangers: vertices and triangles, each, of a mesh; samples

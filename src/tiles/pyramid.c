@@ -1,12 +1,12 @@
 /* pyramid.c - all tiles of a terrain as files, FOLDER/z/x/y.terrain or as their kind names them, and its document,
  * as FOLDER/layer.json, when all are there.
  *
- * Workers take pieces of rows, each with a connection of its own; a tile's bytes depend on nothing but the terrain,
- * so it does not matter which makes it. Each file is written beside its place and renamed: it is there whole or not
- * at all, and what is there need not be made again. FOLDER/.rqt-tiles says of what the tiles are: terrain, state of
- * the database, options. A folder that says something else, or holds files and says nothing, is another's, and is
- * refused; while somebody works in it the file is locked. The document comes last, so a folder that has it is
- * complete.
+ * Workers take pieces of columns, each with a connection of its own; a tile's bytes depend on nothing but the
+ * terrain, so it does not matter which makes it. Each file is written beside its place and renamed: it is there
+ * whole or not at all, and what is there need not be made again. FOLDER/.rqt-tiles says of what the tiles are:
+ * terrain, state of the database, options. A folder that says something else, or holds files and says nothing, is
+ * another's, and is refused; while somebody works in it the file is locked. The document comes last, so a folder
+ * that has it is complete.
  */
 #include "kind.h"
 
@@ -26,7 +26,7 @@
 #define CHANGED "the database has changed meanwhile"
 enum { PIECE = 32, MOST_PATH = 4096, GZIP_LEVEL = 5, GZIP_WINDOW = 15 + 16, GZIP_MEMORY = 8 };
 
-/* A range of tiles. Its pieces, PIECE tiles of a row or what is left of it, are counted over all ranges, not
+/* A range of tiles. Its pieces, PIECE tiles of a column or what is left of it, are counted over all ranges, not
  * listed: there may be more of them than memory. */
 typedef struct stretch {
     int series, z;
@@ -34,10 +34,10 @@ typedef struct stretch {
     size_t first; /* number of its first piece */
 } stretch;
 
-/* Tiles x0..x1 of one row. */
+/* Tiles y0..y1 of one column: files of one folder. */
 typedef struct piece {
     int series, z;
-    int32_t y, x0, x1;
+    int32_t x, y0, y1;
 } piece;
 
 typedef struct pyramid {
@@ -80,15 +80,30 @@ static int make_path(const char *folder, char **error) {
     return make_folder(path, error);
 }
 
+static int open_new(const char *path) {
+    return open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+}
+
+static bool write_bytes(int file, const uint8_t *bytes, size_t size) {
+    while (size > 0) {
+        const ssize_t n = write(file, bytes, size);
+        if (n < 0 && errno == EINTR) continue;
+        if (n < 0) return false;
+        bytes += n;
+        size -= (size_t)n;
+    }
+    return true;
+}
+
 /* Whole or not at all. What a kill has left is made anew, not written to: it could be a link to elsewhere. */
 static int write_file(const char *path, const void *bytes, size_t size, char **error) {
     char part[MOST_PATH + 8];
     snprintf(part, sizeof part, "%s.part", path);
-    unlink(part);
-    FILE *f = fopen(part, "wxe");
-    if (!f) return fail_file(error, part);
-    const bool ok = fwrite(bytes, 1, size, f) == size && fflush(f) == 0;
-    if (fclose(f) == 0 && ok && rename(part, path) == 0) return SQLITE_OK;
+    int f = open_new(part);
+    if (f < 0 && errno == EEXIST && unlink(part) == 0) f = open_new(part);
+    if (f < 0) return fail_file(error, part);
+    const bool ok = write_bytes(f, bytes, size);
+    if (close(f) == 0 && ok && rename(part, path) == 0) return SQLITE_OK;
     (void)fail_file(error, path);
     unlink(part);
     return SQLITE_IOERR;
@@ -149,21 +164,24 @@ static int check_state(const pyramid *p, const tiles *t, char **error) {
 
 /* -------------------------------------------------------------------------------------------------- workers -- */
 
-static int write_tile(pyramid *p, tiles *t, const piece *row, int32_t x, char **error) {
+/* A folder is made when the first of its files is, and not asked for by the others of a piece. */
+static int write_tile(pyramid *p, tiles *t, const piece *column, int32_t y, bool *has_folder, char **error) {
     char path[MOST_PATH];
     struct stat there;
     tile_bytes tile;
-    const tile_series *series = &p->job->kind->series[row->series];
-    const int folder = snprintf(path, sizeof path, "%s/%s%d/%d", p->job->folder, series->folder, row->z, (int)x);
-    snprintf(path + folder, sizeof path - (size_t)folder, "/%d%s", (int)row->y, series->suffix);
+    const tile_series *series = &p->job->kind->series[column->series];
+    const int folder =
+        snprintf(path, sizeof path, "%s/%s%d/%d", p->job->folder, series->folder, column->z, (int)column->x);
+    snprintf(path + folder, sizeof path - (size_t)folder, "/%d%s", (int)y, series->suffix);
     /* An empty one is what a cut of power may leave of a file that has its name already. */
     if (lstat(path, &there) == 0 && S_ISREG(there.st_mode) && there.st_size > 0) return SQLITE_OK;
-    int code = tiles_make(t, row->series, row->z, x, row->y, &tile, error);
+    int code = tiles_make(t, column->series, column->z, column->x, y, &tile, error);
     if (code == SQLITE_OK && tile.size > 0) {
         if (p->job->gzip && !series->is_packed) code = pack(&tile);
         path[folder] = '\0';
-        if (code == SQLITE_OK) code = make_folder(path, error);
+        if (code == SQLITE_OK && !*has_folder) code = make_folder(path, error);
         path[folder] = '/';
+        *has_folder = true;
         if (code == SQLITE_OK) code = write_file(path, tile.bytes, tile.size, error);
         if (code == SQLITE_OK) {
             p->written++;
@@ -185,13 +203,13 @@ static piece find_piece(const pyramid *p, size_t n) {
     }
     const stretch *of = &p->stretches[low];
     const tile_range *r = &of->range;
-    const size_t in_row = ((size_t)(r->x1 - r->x0) + PIECE) / PIECE;
-    const int32_t x = r->x0 + PIECE * (int32_t)((n - of->first) % in_row);
+    const size_t in_column = ((size_t)(r->y1 - r->y0) + PIECE) / PIECE;
+    const int32_t y = r->y0 + PIECE * (int32_t)((n - of->first) % in_column);
     return (piece){.series = of->series,
                    .z = of->z,
-                   .y = r->y0 + (int32_t)((n - of->first) / in_row),
-                   .x0 = x,
-                   .x1 = r->x1 - x < PIECE ? r->x1 : x + PIECE - 1};
+                   .x = r->x0 + (int32_t)((n - of->first) / in_column),
+                   .y0 = y,
+                   .y1 = r->y1 - y < PIECE ? r->y1 : y + PIECE - 1};
 }
 
 static int write_pieces(pyramid *p, tiles *t, char **error) {
@@ -200,9 +218,10 @@ static int write_pieces(pyramid *p, tiles *t, char **error) {
     tiles_tell(t, p->last);
     code = check_state(p, t, error);
     for (size_t n; code == SQLITE_OK && !p->stop && (n = p->next++) < p->count;) {
-        const piece row = find_piece(p, n);
-        for (int32_t x = row.x0; x <= row.x1 && code == SQLITE_OK && !p->stop; x++) {
-            code = write_tile(p, t, &row, x, error);
+        const piece column = find_piece(p, n);
+        bool has_folder = false;
+        for (int32_t y = column.y0; y <= column.y1 && code == SQLITE_OK && !p->stop; y++) {
+            code = write_tile(p, t, &column, y, &has_folder, error);
             p->done++;
         }
     }
@@ -284,7 +303,7 @@ static int add_stretch(pyramid *p, int series, int z, const tile_range *r, size_
         p->stretches = more;
     }
     p->stretches[p->stretch_count++] = (stretch){series, z, *r, p->count};
-    p->count += rows * ((columns + PIECE - 1) / PIECE);
+    p->count += columns * ((rows + PIECE - 1) / PIECE);
     *all += (int64_t)(rows * columns);
     return SQLITE_OK;
 }

@@ -43,16 +43,6 @@
 #define ON_SIDE 0x1p-21
 enum { WEST, SOUTH, EAST, NORTH, SIDES };
 
-typedef struct waiting {
-    store *store;
-    int code;
-} waiting;
-
-static bool is_interrupted(void *context) {
-    waiting *w = context;
-    return store_is_interrupted(w->store, &w->code);
-}
-
 /* The largest leaf's columns and rows. */
 typedef struct extent {
     double columns, rows;
@@ -203,15 +193,15 @@ static int list_side(tile_mesh *mesh, int side) {
 static int cut_patch(tiles *t, const tile_place *place, rqt_patch *patch, tile_mesh *mesh, char **error) {
     const store_query_options options = plan_options(t, place->z);
     rqt_region *region = NULL;
-    waiting w = {t->store, SQLITE_INTERRUPT};
+    store_wait w = {t->store, SQLITE_INTERRUPT};
     int code = plan_region(t, place, &region);
     if (code == SQLITE_OK)
         code = store_query(t->store, t->terrain, region, plan_of(t)->level[place->z].eps, &options, patch, NULL,
                            error);
     if (code == SQLITE_OK) {
         mesh->merged = seam_merge(t, patch);
-        const rqt_status status =
-            rqt_cut_make(patch, region, &t->terrain->lattice, store_allocator(), is_interrupted, &w, &mesh->cut);
+        const rqt_status status = rqt_cut_make(patch, region, &t->terrain->lattice, store_allocator(),
+                                               store_wait_is_over, &w, &mesh->cut);
         code = status == RQT_OK ? SQLITE_OK : status == RQT_INTERRUPTED ? w.code : SQLITE_NOMEM;
     }
     rqt_region_free(region);
