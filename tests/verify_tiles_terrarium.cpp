@@ -28,6 +28,8 @@ constexpr double WORLD = 85.0511287798066; /* where the square ends */
 struct Picture {
     std::vector<int32_t> codes; /* 256ths of a metre above -32768 */
     double states = NAN, off = 0;
+    double around =
+        0; /* the same of what lies between its pixels and their neighbours, half a pixel beyond it too */
     long counted = 0, voids = -1;
 };
 using Key = std::pair<int, int>; /* x, y */
@@ -128,10 +130,12 @@ void Judge::read_document() {
     cJSON_Delete(json);
     if (bounds.size() != 4 || steps.size() != (size_t)last + 1) last = -1;
     if (last < 0) return;
-    const double turned =
-        std::fabs(std::remainder(bounds[0] - raster.x0, 360)) + std::fabs(std::remainder(bounds[2] - east, 360));
-    const bool is_around = east - raster.x0 >= 360 - 1e-9 && bounds[0] == -180 && bounds[2] == 180;
-    says(turned < 1e-9 || is_around, "bounds: west or east");
+    /* Bounds cannot go on beyond 180 degrees: those of what does are all longitudes. */
+    const double west = std::remainder(raster.x0, 360), end = west + east - raster.x0;
+    const double off =
+        std::fabs(std::remainder(bounds[0] - west, 360)) + std::fabs(std::remainder(bounds[2] - end, 360));
+    says(end > 180 + 1e-9 ? bounds[0] == -180 && bounds[2] == 180 : off < 1e-9 && bounds[0] < bounds[2],
+         "bounds: west or east");
     says(std::fabs(bounds[1] - std::clamp(south, -WORLD, WORLD)) +
                  std::fabs(bounds[3] - std::clamp(raster.y0, -WORLD, WORLD)) <
              1e-9,
@@ -218,6 +222,7 @@ void Judge::judge_samples(int z) {
 void Judge::judge_row(int z, int r, double y, const std::vector<Between> &columns, const std::vector<int> &used) {
     std::vector<int> rows;
     const Between row = between(y, (long)PIXELS << z, false, rows);
+    std::vector<Picture *> first_row, second_row;
     std::vector<const int32_t *> upper, lower;
     std::vector<std::vector<Picture *>> own;
     const auto find = [&](int x, size_t k) {
@@ -225,7 +230,9 @@ void Judge::judge_row(int z, int r, double y, const std::vector<Between> &column
         return found == level.end() ? nullptr : &found->second;
     };
     for (int x : used) {
-        const Picture *above = find(x, row.first), *below = find(x, row.second);
+        Picture *above = find(x, row.first), *below = find(x, row.second);
+        first_row.push_back(above);
+        second_row.push_back(below);
         upper.push_back(above ? &above->codes[(size_t)row.before * PIXELS] : nullptr);
         lower.push_back(below ? &below->codes[(size_t)row.behind * PIXELS] : nullptr);
         own.emplace_back();
@@ -241,6 +248,9 @@ void Judge::judge_row(int z, int r, double y, const std::vector<Between> &column
                      below = metres(sw) * (1 - b.share) + metres(se) * b.share;
         const double off =
             std::fabs(above * (1 - row.share) + below * row.share - raster.source(raster.index(c, r)));
+        for (Picture *picture :
+             {first_row[b.first], first_row[b.second], second_row[b.first], second_row[b.second]})
+            picture->around = std::max(picture->around, off); /* there: they have heights */
         figures.counted++;
         figures.across += b.first != b.second || row.first != row.second;
         for (size_t x : b.tiles)
@@ -265,10 +275,10 @@ void Judge::judge_errors(int z) {
         figures.states = std::max(figures.states, picture.states);
         figures.off = std::max(figures.off, picture.off);
         figures.share = std::max(figures.share, picture.off / picture.states);
-        if (picture.off > step) figures.idle = std::max(figures.idle, picture.states / picture.off);
-        verdict.see(idle, picture.states <= 2 * picture.off + step + 0.01, [&, &k = key, &p = picture] {
-            return name_of(z, k.first, k.second) + " says " + std::to_string(p.states) + " m and is " +
-                   std::to_string(p.off) + " m off";
+        if (picture.around > step) figures.idle = std::max(figures.idle, picture.states / picture.around);
+        verdict.see(idle, picture.states <= 2 * picture.around + step + 0.01, [&, &k = key, &p = picture] {
+            return name_of(z, k.first, k.second) + " says " + std::to_string(p.states) + " m of " +
+                   std::to_string(p.counted) + " samples and is " + std::to_string(p.off) + " m off";
         });
     }
     error.worst = std::max(error.worst, figures.share);
