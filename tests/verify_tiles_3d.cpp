@@ -19,12 +19,15 @@
  *               voids end at the side only one of them may have ground: then no vertex of it lies on an edge of the
  *               other
  *     skirt     what hangs from the sides that neighbours have, as a second surface: upper ends are the ground's
- * own vertices and normals, lower ones no further down than the content says, and twice what the tile states at
- * least, in the region normals   within a degree of the raster's central differences in space regions   vertices,
- * the middles of triangles and of their sides, and regions of children lie in them; the root's, divided again and
- * again, has the vertices of each tile errors    do not grow from a tile to its children; clients without metadata
- * reckon with no less; a content tells its tile's tiles     are the cells that have a part of the raster, in all
- * levels listed    contents and subtrees that availability tells are the files that there are
+ *               own vertices and normals, lower ones no further down than the content says, and at least twice
+ *               what the tile states, in the region
+ *     normals   within a degree of the raster's central differences in space
+ *     regions   vertices, the middles of triangles and of their sides, and regions of children lie in them; the
+ *               root's, divided again and again, has the vertices of each tile
+ *     errors    do not grow from a tile to its children; clients without metadata reckon with no less; a content
+ *               tells its tile's
+ *     tiles     are the cells that have a part of the raster, in all levels
+ *     listed    contents and subtrees that availability tells are the files that there are
  */
 #include "verify_tiles_implicit.h"
 
