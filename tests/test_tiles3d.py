@@ -90,12 +90,13 @@ def accessor(gltf, buffer, number):
 
 
 class Tile:
-    """A tile's content: decoded as a client does, the sum of the node's translation and the positions, z up."""
+    """A tile's content: decoded as a client does, the sum of what the node's matrix moves by and the positions, z up."""
 
     def __init__(self, data):
         gltf, buffer = chunks(data)
         primitive = gltf["meshes"][0]["primitives"][0]
-        tx, ty, tz = gltf["nodes"][0]["translation"]
+        *turn, tx, ty, tz, one = gltf["nodes"][0]["matrix"]
+        assert (*turn, one) == (1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 1)
         places = [(tx + x, ty + y, tz + z) for x, y, z in accessor(gltf, buffer, primitive["attributes"]["POSITION"])]
         self.xyz = [(x, -z, y) for x, y, z in places]
         self.normals = [(x, -z, y) for x, y, z in accessor(gltf, buffer, primitive["attributes"]["NORMAL"])]

@@ -5,6 +5,7 @@ import {mkdtempSync, readFileSync, readdirSync, rmSync} from 'node:fs';
 import {join} from 'node:path';
 import {after, test} from 'node:test';
 import {BUILD, ROOT, requirePackage} from './packages.mjs';
+import {heightsUnder} from './samples.mjs';
 
 const {default: decode} = requirePackage('@here/quantized-mesh-decoder');
 const RQT = process.env.RQT || join(BUILD, 'rqt');
@@ -40,27 +41,16 @@ function tilesOf(z) {
 
 /** The share of what the tile allows that its worst sample takes; samples that it covers. */
 function measure(tile) {
-    const {u, v, h, header, triangleIndices} = tile;
+    const {u, v, h, header, triangleIndices: triangles} = tile;
     const allowed = tile.extensions.metadata.verticalError, scale = tile.side / UNITS / STEP;
     const across = (tile.west - WEST) / STEP, down = (NORTH - tile.south) / STEP; // samples of the tile's south-west corner
+    const x = Float64Array.from(u, n => across + n * scale), y = Float64Array.from(v, n => down - n * scale);
+    const z = Float64Array.from(h, n => header.minHeight + (header.maxHeight - header.minHeight) * n / UNITS);
     let worst = 0, samples = 0;
-    for (let i = 0; i < triangleIndices.length; i += 3) {
-        const [a, b, c] = triangleIndices.subarray(i, i + 3);
-        const xa = across + u[a] * scale, xb = across + u[b] * scale, xc = across + u[c] * scale;
-        const ya = down - v[a] * scale, yb = down - v[b] * scale, yc = down - v[c] * scale;
-        const area = (xb - xa) * (yc - ya) - (xc - xa) * (yb - ya);
-        if (area === 0) continue;
-        const last = Math.min(SIDE - 1, Math.floor(Math.max(ya, yb, yc))), right = Math.min(SIDE - 1, Math.floor(Math.max(xa, xb, xc)));
-        for (let row = Math.max(0, Math.ceil(Math.min(ya, yb, yc))); row <= last; row++)
-            for (let col = Math.max(0, Math.ceil(Math.min(xa, xb, xc))); col <= right; col++) {
-                const wb = ((col - xa) * (yc - ya) - (xc - xa) * (row - ya)) / area, wc = ((xb - xa) * (row - ya) - (col - xa) * (yb - ya)) / area;
-                if (wb < -1e-9 || wc < -1e-9 || wb + wc > 1 + 1e-9) continue;
-                const share = ((1 - wb - wc) * h[a] + wb * h[b] + wc * h[c]) / UNITS;
-                const z = header.minHeight + (header.maxHeight - header.minHeight) * share;
-                worst = Math.max(worst, Math.abs(z - heights[row * SIDE + col]) / allowed);
-                samples++;
-            }
-    }
+    heightsUnder({x, y, z, triangles}, SIDE, SIDE, (col, row, height) => {
+        worst = Math.max(worst, Math.abs(height - heights[row * SIDE + col]) / allowed);
+        samples++;
+    });
     return {worst, samples};
 }
 

@@ -6,10 +6,11 @@
  * Axes. Clients of 3D Tiles turn glTF's y-up into their z-up, (x, y, z) to (x, -z, y): so a geocentric (X, Y, Z) is
  * (X, Z, -Y) here.
  *
- * Where it is. The node's translation has the origin, whole metres and steps, which is a double there whatever it
- * is printed with: clients of 3D Tiles add it to their matrices in double (CesiumJS does),
+ * Where it is. The node's matrix moves by the origin, whole metres and steps, which is a double there whatever it
+ * is printed with: clients of 3D Tiles multiply it with their matrices in double,
  * unlike viewers of models (format/glb.c). Positions are whole steps from it, as floats exactly. What two tiles
- * share is decoded to the same doubles in both: translation + position is exact.
+ * share is decoded to the same doubles in both: origin + position is exact. A translation would say the same, but
+ * deck.gl leaves one of millions of metres to the floats of its shaders, where it is off by a quarter of a metre.
  *
  * Extras have what the tile is off (tile.c), as the subtree does.
  */
@@ -42,9 +43,9 @@ static cJSON *number(double value) {
     return cJSON_CreateRaw(digits);
 }
 
-static void add_numbers(cJSON *to, const char *name, const double values[3]) {
+static void add_numbers(cJSON *to, const char *name, const double *values, int count) {
     cJSON *list = cJSON_AddArrayToObject(to, name);
-    for (int i = 0; i < 3; i++) cJSON_AddItemToArray(list, number(values[i]));
+    for (int i = 0; i < count; i++) cJSON_AddItemToArray(list, number(values[i]));
 }
 
 static void add_asset(const tiles *t, block_tile tile, double error, cJSON *json) {
@@ -100,8 +101,8 @@ static void add_box(const block_mesh *mesh, double step, cJSON *positions) {
             high[k] = fmax(high[k], at[k]);
         }
     }
-    add_numbers(positions, "min", low);
-    add_numbers(positions, "max", high);
+    add_numbers(positions, "min", low, 3);
+    add_numbers(positions, "max", high, 3);
 }
 
 static void add_scene(const block_mesh *mesh, cJSON *json) {
@@ -111,10 +112,10 @@ static void add_scene(const block_mesh *mesh, cJSON *json) {
     cJSON_AddNumberToObject(json, "scene", 0);
     cJSON_AddItemToObject(json, "scenes", cJSON_Parse("[{\"nodes\":[0]}]"));
     cJSON *nodes = cJSON_AddArrayToObject(json, "nodes"), *node = cJSON_CreateObject();
-    double at[3];
-    turn(mesh->origin, at);
+    double matrix[16] = {[0] = 1, [5] = 1, [10] = 1, [15] = 1}; /* column by column */
+    turn(mesh->origin, matrix + 12);
     cJSON_AddNumberToObject(node, "mesh", 0);
-    add_numbers(node, "translation", at);
+    add_numbers(node, "matrix", matrix, 16);
     cJSON_AddItemToArray(nodes, node);
     cJSON_AddItemToObject(json, "meshes",
                           cJSON_Parse("[{\"primitives\":[{\"attributes\":{\"POSITION\":0,\"NORMAL\":1},"

@@ -113,8 +113,12 @@ static int add_doubles(buffer *b, const double *values, int count) {
     return view;
 }
 
-static void add_availability(buffer *b, const bits *available, cJSON *to) {
-    if (available->count == 0 || available->count == available->size) {
+static bool is_constant(const bits *b) {
+    return b->count == 0 || b->count == b->size;
+}
+
+static void add_availability(buffer *b, const bits *available, bool constant, cJSON *to) {
+    if (constant) {
         cJSON_AddNumberToObject(to, "constant", available->count > 0);
         return;
     }
@@ -140,10 +144,13 @@ static cJSON *describe(const subtree *s, buffer *b) {
     add_property(properties, "error", add_doubles(b, s->error, s->tiles.count));
     add_property(properties, "region", add_doubles(b, s->region, REGION * s->tiles.count));
     cJSON_AddNumberToObject(json, "tileMetadata", 0);
-    add_availability(b, &s->tiles, cJSON_AddObjectToObject(json, "tileAvailability"));
+    /* deck.gl looks tiles below up here where there is no subtree of theirs, and finds them in a constant. */
+    const bool ends = is_constant(&s->tiles) && is_constant(&s->below);
+    add_availability(b, &s->tiles, ends, cJSON_AddObjectToObject(json, "tileAvailability"));
     cJSON_AddItemToArray(cJSON_AddArrayToObject(json, "contentAvailability"), content);
-    add_availability(b, &s->contents, content);
-    add_availability(b, &s->below, cJSON_AddObjectToObject(json, "childSubtreeAvailability"));
+    add_availability(b, &s->contents, is_constant(&s->contents), content);
+    add_availability(b, &s->below, is_constant(&s->below),
+                     cJSON_AddObjectToObject(json, "childSubtreeAvailability"));
     cJSON_AddNumberToObject(whole, "byteLength", (double)b->size);
     cJSON_AddItemToArray(buffers, whole);
     return json;
