@@ -88,7 +88,7 @@ class Glb:
         self.buffer = 28 + length
         self.counts = [a["count"] for a in self.json["accessors"]]
         self.at = [self.buffer + view["byteOffset"] for view in self.json["bufferViews"]]
-        x, y, z = self.json["nodes"][0]["translation"]
+        x, y, z = self.json["nodes"][0]["matrix"][12:15]
         self.up = [d / math.hypot(x, y, z) for d in (x, y, z)]
 
     def position(self, i):
