@@ -171,17 +171,16 @@ static int window(store *s, const store_terrain *t, int32_t col, int32_t row, in
             int read;
             const int code = store_get_block(s, t, rqt_block_number_of(level, i, j), &block, &read, error);
             if (code != SQLITE_OK) return code;
-            for (int32_t v = 0; v < n; v++) {
-                const int32_t y = (j << shift) + v;
-                if (y < row || y >= row + height || y >= t->lattice.height) continue;
-                for (int32_t u = 0; u < n; u++) {
-                    const int32_t x = (i << shift) + u;
-                    if (x < col || x >= col + width || x >= t->lattice.width) continue;
-                    const size_t to = (size_t)(y - row) * (size_t)width + (size_t)(x - col);
-                    const size_t from = (size_t)v * (size_t)n + (size_t)u;
+            const int32_t x0 = i << shift, y0 = j << shift; /* of the block; then what it has of the window */
+            const int32_t west = x0 > col ? x0 : col, east = x0 + n < col + width ? x0 + n : col + width;
+            const int32_t north = y0 > row ? y0 : row, south = y0 + n < row + height ? y0 + n : row + height;
+            for (int32_t y = north; y < south; y++) {
+                const size_t to = (size_t)(y - row) * (size_t)width + (size_t)(west - col);
+                const size_t from = (size_t)(y - y0) * (size_t)n + (size_t)(west - x0);
+                for (size_t u = 0; u < (size_t)(east - west); u++) {
                     /* NOLINTNEXTLINE(clang-analyzer-core.NullDereference): a block, or a code */
-                    q[to] = block->q[from];
-                    valid[to] = block->flags[from] & RQT_VALID;
+                    q[to + u] = block->q[from + u];
+                    valid[to + u] = block->flags[from + u] & RQT_VALID;
                 }
             }
         }

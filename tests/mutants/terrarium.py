@@ -1,15 +1,15 @@
 """Mutants of the tiles for maps: see ../mutants.py."""
 
 TERRARIUM = "test_terrarium.py"
-KIND, PIXELS, SAMPLES, LATTICE, PROOF, PNG = ("src/tiles/terrarium/%s.c" % name for name in ("terrarium", "pixels", "samples", "lattice", "proof", "png"))
+KIND, PIXELS, SAMPLES, PROOF, PNG = ("src/tiles/terrarium/%s.c" % name for name in ("terrarium", "pixels", "samples", "proof", "png"))
 SERVE = "src/serve/tiles.c"
 
 MUTANTS = [
     # the error
-    ("terrarium: leaves have no error of their own", PROOF, "here.bound = off < 0 ? -1 : off + l->floor;", "here.bound = off;", TERRARIUM, "the stated error holds"),
+    ("terrarium: leaves have no error of their own", PROOF, "here.bound = off < 0 ? -1 : off + p->l.floor;", "here.bound = off;", TERRARIUM, "the stated error holds"),
     ("terrarium: the smallest bound gives way first", PROOF, "p->parts[(at - 1) / 2].bound < new.bound;", "p->parts[(at - 1) / 2].bound > new.bound;", TERRARIUM, "the stated error holds"),
     ("terrarium: boxes never give way to their children", PROOF, "MOST_SPLITS = 1200", "MOST_SPLITS = 0", TERRARIUM, "times the true one"),
-    ("terrarium: one child is not looked at", PROOF, "for (int c = 0; c < 4 && code == SQLITE_OK; c++) {", "for (int c = 0; c < 3 && code == SQLITE_OK; c++) {", TERRARIUM, "the stated error holds"),
+    ("terrarium: two children are not looked at", PROOF, "x % cells + size, y % cells, y % cells + size}", "x % cells + size / 2, y % cells, y % cells + size}", TERRARIUM, "the stated error holds"),
     ("terrarium: all samples are not measured", SAMPLES, "if (off > most) most = off;", "if (off > most && y % 2) most = off;", TERRARIUM, "the stated error holds"),
     ("terrarium: rows of pixels are even in latitude", SAMPLES, "const double n = (top - next) / (2 * M_PI) * ldexp(PIXELS, g->z);",
      "const double n = (g->lat[0] - lat) / (g->lat[0] - g->lat[GRID - 1]) * (GRID - 1) + 0 * (top - next);", TERRARIUM, "the stated error holds"),

@@ -22,15 +22,15 @@ bool triangle_span(const corner triangle[3], double from, double to, double *wes
     for (int a = 0; a < 3; a++) {
         const corner *p = &triangle[a], *q = &triangle[a == 2 ? 0 : a + 1];
         if (p->row >= from && p->row <= to) {
-            *west = fmin(*west, p->col);
-            *east = fmax(*east, p->col);
+            *west = smaller(*west, p->col);
+            *east = larger(*east, p->col);
         }
         for (int b = 0; b < 2; b++) {
             const double row = b ? to : from;
             if ((p->row < row) == (q->row < row)) continue;
             const double col = p->col + (q->col - p->col) * ((row - p->row) / (q->row - p->row));
-            *west = fmin(*west, col);
-            *east = fmax(*east, col);
+            *west = smaller(*west, col);
+            *east = larger(*east, col);
         }
     }
     return *west <= *east;
@@ -111,10 +111,10 @@ static int visit_turn(tiles *t, int level, pixel_grid *g, int turn, visit_block 
                       char **error) {
     const rqt_lattice *all = &t->terrain->lattice;
     const double side = ldexp(1, all->K - level);
-    const int32_t i0 = (int32_t)floor(fmax(g->col[0] - 1, 0) / side),
-                  j0 = (int32_t)floor(fmax(g->row[0] - 1, 0) / side);
-    const int32_t i1 = (int32_t)floor(fmin(g->col[GRID - 1] + 1, all->width - 1) / side),
-                  j1 = (int32_t)floor(fmin(g->row[GRID - 1] + 1, all->height - 1) / side);
+    const int32_t i0 = (int32_t)floor(larger(g->col[0] - 1, 0) / side),
+                  j0 = (int32_t)floor(larger(g->row[0] - 1, 0) / side);
+    const int32_t i1 = (int32_t)floor(smaller(g->col[GRID - 1] + 1, all->width - 1) / side),
+                  j1 = (int32_t)floor(smaller(g->row[GRID - 1] + 1, all->height - 1) / side);
     for (int32_t j = j0; j <= j1; j++)
         for (int32_t i = i0; i <= i1; i++) {
             const rqt_block_number number = rqt_block_number_of(level, i, j);
@@ -150,20 +150,25 @@ static void draw_pixels(const lattice *l, const lattice_box *box) {
         }
 }
 
-/* Pixels whose square meets a leaf that is not kept are void. Squares reach to the middle between pixels, and a
- * little further, or a place on the line between two might be nobody's. */
-static void void_leaf(const lattice *l, const corner leaf[3]) {
+/* The rows that a pixel's square takes, and a little more: the middle between rows in Mercator's plane is not the
+ * one in latitude. */
+static void reach(const pixel_grid *g, int j, double *from, double *to) {
+    const double up = j > 0 ? g->row[j] - g->row[j - 1] : 0, down = j + 1 < GRID ? g->row[j + 1] - g->row[j] : 0;
+    *from = g->row[j] - 0.625 * up - SLACK;
+    *to = g->row[j] + 0.625 * down + SLACK;
+}
+
+/* Pixels whose square meets a triangle are void. Squares reach to the middle between pixels, and a little further,
+ * or a place on the line between two might be nobody's. */
+static void void_triangle(const lattice *l, const corner triangle[3]) {
     pixel_grid *g = l->g;
-    const lattice_box b = lattice_box_of(leaf);
+    const lattice_box b = lattice_box_of(triangle);
     const double half = 0.5 / g->per_col + SLACK;
     for (int j = l->first_row[b.north] > 0 ? l->first_row[b.north] - 1 : 0; j < GRID; j++) {
-        const double up = j > 0 ? g->row[j] - g->row[j - 1] : 0,
-                     down = j + 1 < GRID ? g->row[j + 1] - g->row[j] : 0;
-        /* The middle in Mercator's plane is not the one in latitude: a quarter more. */
-        const double from = g->row[j] - 0.625 * up - SLACK, to = g->row[j] + 0.625 * down + SLACK;
-        double west, east;
+        double from, to, west, east;
+        reach(g, j, &from, &to);
         if (from > l->row[b.south]) break;
-        if (!triangle_span(leaf, from, to, &west, &east)) continue;
+        if (!triangle_span(triangle, from, to, &west, &east)) continue;
         for (int i = l->first_col[b.west] > 0 ? l->first_col[b.west] - 1 : 0; i < GRID; i++) {
             if (g->col[i] - half > east) break;
             if (g->col[i] + half >= west) g->code[j * GRID + i] = NO_HEIGHT;
@@ -171,15 +176,80 @@ static void void_leaf(const lattice *l, const corner leaf[3]) {
     }
 }
 
-static void void_triangle(const lattice *l, const corner triangle[3]) {
+/* ... or a run of cells in a row of the lattice. */
+static void void_run(const lattice *l, int west, int east, int y) {
+    pixel_grid *g = l->g;
+    const double half = 0.5 / g->per_col + SLACK;
+    int first = l->first_col[west] > 0 ? l->first_col[west] - 1 : 0, last = l->first_col[east];
+    if (g->col[first] + half < l->col[west]) first++;
+    if (last == GRID || g->col[last] - half > l->col[east]) last--;
+    for (int j = l->first_row[y] > 0 ? l->first_row[y] - 1 : 0; j < GRID; j++) {
+        double from, to;
+        reach(g, j, &from, &to);
+        if (from > l->row[y + 1]) break;
+        if (to < l->row[y]) continue;
+        for (int i = first; i <= last; i++) g->code[j * GRID + i] = NO_HEIGHT;
+    }
+}
+
+/* Is the half of a cell that has its right angle at a corner of it, 0 or 1 right and down, on a triangle of the
+ * lattice (whose sides are longer)? Its centre tells. */
+static bool is_in(const corner triangle[3], int x, int y, int right, int down) {
+    const int cx = 3 * x + 1 + right, cy = 3 * y + 1 + down;
+    int signs = 0;
+    for (int a = 0; a < 3; a++) {
+        const corner *p = &triangle[a], *q = &triangle[a == 2 ? 0 : a + 1];
+        signs += (q->i - p->i) * (cy - 3 * p->j) > (q->j - p->j) * (cx - 3 * p->i) ? 1 : -1;
+    }
+    return signs == 3 || signs == -3;
+}
+
+/* What of a triangle of the lattice has no height: halves of cells. */
+static void void_cells(const lattice *l, const lattice_box *box, const corner triangle[3]) {
+    lattice_box b = lattice_box_of(triangle);
+    if (b.west < box->west) b.west = box->west;
+    if (b.east > box->east) b.east = box->east;
+    if (b.north < box->north) b.north = box->north;
+    if (b.south > box->south) b.south = box->south;
+    for (int y = b.north; y < b.south; y++) {
+        int begun = b.west; /* the run that ends here */
+        for (int x = b.west; x < b.east; x++) {
+            const uint8_t *up = l->what + (size_t)y * (size_t)l->n + (size_t)x, *down = up + l->n;
+            const int is_main = (x + y + l->turned) % 2 == 0;
+            const int nw = up[0], ne = up[1], sw = down[0], se = down[1];
+            bool is_void[2] = {false, false}; /* of the upper and the lower half */
+            if (!(nw & ne & sw & se & HAS_HEIGHT))
+                for (int half = 0; half < 2; half++)
+                    is_void[half] =
+                        !((is_main ? nw & se & (half ? sw : ne) : ne & sw & (half ? se : nw)) & HAS_HEIGHT) &&
+                        is_in(triangle, x, y, is_main ? !half : half, half);
+            if (is_void[0] && is_void[1]) continue;
+            if (begun < x) void_run(l, begun, x, y);
+            begun = x + 1;
+            if (!is_void[0] && !is_void[1]) continue;
+            const int half = is_void[1];
+            const corner found[3] = {lattice_corner(l, is_main ? x : x + 1, y),
+                                     lattice_corner(l, is_main ? x + 1 : x, y + 1),
+                                     lattice_corner(l, is_main ? x + !half : x + half, y + half)};
+            void_triangle(l, found);
+        }
+        if (begun < b.east) void_run(l, begun, b.east, y);
+    }
+}
+
+/* What of a triangle of the block has no height: leaves, where cells of the lattice are not parts of them. */
+static void void_leaves(const lattice *l, const rqt_block_place *place, const lattice_box *box,
+                        const corner triangle[3]) {
     corner children[2][3];
-    plane p;
-    if (lattice_misses(l, triangle)) return;
-    if (lattice_split(l, triangle, children)) {
-        void_triangle(l, children[0]);
-        void_triangle(l, children[1]);
-    } else if (!(triangle[0].valid && triangle[1].valid && triangle[2].valid) && triangle_plane(triangle, &p)) {
-        void_leaf(l, triangle);
+    if (!l->is_squeezed || !lattice_straddles(l, place, triangle)) {
+        void_cells(l, box, triangle);
+    } else if (!lattice_misses(l, triangle)) {
+        if (lattice_split(l, triangle, children)) {
+            void_leaves(l, place, box, children[0]);
+            void_leaves(l, place, box, children[1]);
+        } else if (!(triangle[0].valid && triangle[1].valid && triangle[2].valid)) {
+            void_triangle(l, triangle);
+        }
     }
 }
 
@@ -192,10 +262,10 @@ static int draw_block(tiles *t, const rqt_block_place *place, rqt_block_number n
     const int code = lattice_read(t, place, number, l, &box, error);
     if (code != SQLITE_OK) return code;
     draw_pixels(l, &box);
-    if (!l->has_voids) return SQLITE_OK;
+    if (!l->has_voids && !l->is_squeezed) return SQLITE_OK;
     lattice_halves(l, place, halves);
-    void_triangle(l, halves[0]);
-    void_triangle(l, halves[1]);
+    void_leaves(l, place, &box, halves[0]);
+    void_leaves(l, place, &box, halves[1]);
     return SQLITE_OK;
 }
 

@@ -18,10 +18,10 @@ typedef struct lattice {
     pixel_grid *g;
     const rqt_block *block; /* until another one is read */
     int n;                  /* vertices a side */
+    double stride;          /* samples from one to the next, where it is not squeezed */
     int turned;             /* 1: the diagonals are the other way around, as in a block of one cell */
     bool is_squeezed;       /* reaches beyond the raster */
-    bool has_voids;         /* in the box */
-    double scale, zero;     /* metres of a block's height, and of 0 */
+    bool has_voids;         /* at vertices in the box */
     double floor;           /* metres: samples in leaves with three corners are no further off */
     double col[MOST_SIDE], row[MOST_SIDE];          /* of its columns and rows, in samples */
     int first_col[MOST_SIDE], first_row[MOST_SIDE]; /* the pixels that are at them or next beyond */

@@ -24,11 +24,14 @@
 
 enum { LOWEST = -32768, CODES = 1 << 24, PER_METRE = 256 };
 
-void pixels_place(const tiles *t, int z, int32_t x, int32_t y, pixel_grid *g) {
+void pixels_place(const tiles *t, int z, int32_t x, int32_t y, double step, pixel_grid *g) {
     const double count = ldexp(PIXELS, z), first_x = (double)x * PIXELS - 1, first_y = (double)y * PIXELS - 1;
     const rqt_placement *at = &t->terrain->placement;
     g->terrain = t->terrain;
     g->z = z;
+    g->code_step = (int32_t)(step * PER_METRE);
+    g->per_step = 1 / step; /* a power of two, as step is */
+    g->most_steps = (double)CODES / g->code_step - 1;
     g->error = 0;
     for (int i = 0; i < GRID; i++) {
         g->lon[i] = (first_x + i + 0.5) * 360 / count - 180;
@@ -61,23 +64,26 @@ bool pixels_turn(pixel_grid *g, int turn) {
 }
 
 int32_t pixels_code(const pixel_grid *g, double metres) {
-    const int32_t step = (int32_t)(g->step * PER_METRE);
-    const double n = (metres - LOWEST) / g->step + 0.5, most = (double)CODES / step - 1;
+    const int32_t step = g->code_step;
+    const double n = (metres - LOWEST) * g->per_step + 0.5, most = g->most_steps;
     const int32_t code = step * (int32_t)(n < 0 ? 0 : n > most ? most : n);
     if (code == NO_HEIGHT) return metres < 0 ? NO_HEIGHT - step : NO_HEIGHT + step;
     return code;
 }
 
+/* Loops that the compiler does many pixels of at once. */
 void pixels_close(pixel_grid *g) {
     for (size_t i = 0; i < (size_t)GRID * GRID; i++) {
-        if (g->code[i] == UNKNOWN) g->code[i] = NO_HEIGHT;
+        g->code[i] = g->code[i] == UNKNOWN ? NO_HEIGHT : g->code[i];
         g->height[i] = (double)g->code[i] / PER_METRE + LOWEST;
     }
-    memset(g->is_whole, 0, sizeof g->is_whole);
-    for (size_t j = 0; j + 1 < GRID; j++)
-        for (size_t i = 0; i + 1 < GRID; i++) {
-            const int32_t *c = g->code + j * GRID + i;
-            g->is_whole[j * GRID + i] =
-                c[0] != NO_HEIGHT && c[1] != NO_HEIGHT && c[GRID] != NO_HEIGHT && c[GRID + 1] != NO_HEIGHT;
-        }
+    for (size_t j = 0; j + 1 < GRID; j++) {
+        const int32_t *c = g->code + j * GRID;
+        uint8_t *is_whole = g->is_whole + j * GRID;
+        for (size_t i = 0; i + 1 < GRID; i++)
+            is_whole[i] = (c[i] != NO_HEIGHT) & (c[i + 1] != NO_HEIGHT) & (c[GRID + i] != NO_HEIGHT) &
+                          (c[GRID + i + 1] != NO_HEIGHT);
+        is_whole[GRID - 1] = 0;
+    }
+    memset(g->is_whole + (size_t)(GRID - 1) * GRID, 0, GRID);
 }

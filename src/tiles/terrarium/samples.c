@@ -21,8 +21,8 @@ typedef struct window {
 /* The samples around the pixels of the turn. */
 static int read_window(tiles *t, const pixel_grid *g, window *w, char **error) {
     const int32_t width = t->terrain->lattice.width, height = t->terrain->lattice.height;
-    const double west = fmax(floor(g->col[0]), 0), east = fmin(ceil(g->col[GRID - 1]), width - 1);
-    const double north = fmax(floor(g->row[0]), 0), south = fmin(ceil(g->row[GRID - 1]), height - 1);
+    const double west = larger(floor(g->col[0]), 0), east = smaller(ceil(g->col[GRID - 1]), width - 1);
+    const double north = larger(floor(g->row[0]), 0), south = smaller(ceil(g->row[GRID - 1]), height - 1);
     *w = (window){.col = (int32_t)west,
                   .row = (int32_t)north,
                   .width = (int32_t)(east - west) + 1,
@@ -33,8 +33,11 @@ static int read_window(tiles *t, const pixel_grid *g, window *w, char **error) {
     w->valid = sqlite3_malloc64(count);
     if (!w->metres || !w->q || !w->valid) return SQLITE_NOMEM;
     const int code = store_window(t->store, t->terrain, w->col, w->row, w->width, w->height, w->q, w->valid, error);
-    for (size_t i = 0; i < count && code == SQLITE_OK; i++)
-        w->metres[i] = w->valid[i] ? rqt_unit_metres(&t->terrain->unit, w->q[i]) : 0;
+    if (code != SQLITE_OK) return code;
+    /* rqt_unit_metres, of many at once. */
+    const rqt_unit *unit = &t->terrain->unit;
+    const double z0 = (double)unit->z0, d = (double)unit->d, factor = rqt_unit_factor(unit), offset = unit->offset;
+    for (size_t i = 0; i < count; i++) w->metres[i] = (z0 + w->q[i] / d) * factor + offset;
     return code;
 }
 
@@ -103,8 +106,8 @@ static bool find_row(const pixel_grid *g, int32_t row, int *j, double *v) {
     /* Rows of pixels are the same distance apart in the plane. */
     const double top = asinh(tan(g->lat[0] * DEGREE)), next = asinh(tan(lat * DEGREE));
     const double n = (top - next) / (2 * M_PI) * ldexp(PIXELS, g->z);
-    *j = (int)fmin(fmax(floor(n), 0), GRID - 2);
-    *v = fmin(fmax(n - *j, 0), 1);
+    *j = (int)smaller(larger(floor(n), 0), GRID - 2);
+    *v = smaller(larger(n - *j, 0), 1);
     return true;
 }
 
@@ -115,7 +118,7 @@ static int find_cols(const pixel_grid *g, const window *w, int32_t *from, int *i
         const double n = (w->col + x - g->col[0]) * g->per_col;
         if (n < 0 || n > GRID - 1) continue;
         if (count == 0) *from = x;
-        i[count] = (int)fmin(floor(n), GRID - 2);
+        i[count] = (int)smaller(floor(n), GRID - 2);
         u[count] = n - i[count];
         count++;
     }

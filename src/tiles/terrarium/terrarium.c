@@ -133,8 +133,7 @@ static int make(tiles *t, int series, int z, int32_t x, int32_t y, tile_bytes *o
     if (!is_there) return SQLITE_OK;
     pixel_grid *g = sqlite3_malloc64(sizeof *g);
     if (!g) return SQLITE_NOMEM;
-    g->step = plan->step[z];
-    pixels_place(t, z, x, y, g);
+    pixels_place(t, z, x, y, plan->step[z], g);
     int code = plan->shift[z] == 0 ? samples_draw(t, g, error) : leaves_draw(t, plan->shift[z], g, error);
     if (code == SQLITE_OK) code = png_write(g, out);
     sqlite3_free(g);

@@ -31,7 +31,8 @@ typedef struct terrarium_plan {
 typedef struct pixel_grid {
     const store_terrain *terrain;
     int z;
-    double step;
+    int32_t code_step;             /* between heights that are told apart, in codes */
+    double per_step, most_steps;   /* of them in a metre; the last one's number */
     double lon[GRID], lat[GRID];   /* of pixels' centres, degrees; longitudes as they come, from below -180 on */
     double col[GRID], row[GRID];   /* the same in samples, on the turn that is at hand: both grow */
     double per_col, per_row[GRID]; /* 1 / distance to the next pixel; per_row[GRID - 1] is not used */
@@ -41,8 +42,8 @@ typedef struct pixel_grid {
     double error; /* no sample between four pixels of terrain is further from what is drawn: metres */
 } pixel_grid;
 
-/* Places; nothing is known of heights. */
-void pixels_place(const tiles *t, int z, int32_t x, int32_t y, pixel_grid *g);
+/* Places; nothing is known of heights, but that they are told in steps of so many metres, a power of two. */
+void pixels_place(const tiles *t, int z, int32_t x, int32_t y, double step, pixel_grid *g);
 /* The turns of 360 degrees on which some pixel may be in the raster. */
 void pixels_turns(const pixel_grid *g, int *first, int *last);
 /* col and per_col for a turn; false: no pixel is in the raster's columns and rows. */
@@ -56,6 +57,14 @@ static inline double pixels_between(const pixel_grid *g, size_t at, double u, do
     const double *h = g->height + at;
     const double above = h[0] + u * (h[1] - h[0]), below = h[GRID] + u * (h[GRID + 1] - h[GRID]);
     return above + v * (below - above);
+}
+
+/* As fmax and fmin, which are calls. */
+static inline double larger(double a, double b) {
+    return a > b ? a : b;
+}
+static inline double smaller(double a, double b) {
+    return a < b ? a : b;
 }
 
 /* Codes, and the error. */
