@@ -17,5 +17,5 @@ MUTANTS = [
     ("judge: clients may not say which extensions they want", ENDPOINTS, '" extensions v ", answer_tile', '" ", answer_tile', JUDGE, "the service has what is listed"),
     ("judge: a tile of 3D Tiles states less than it is off", "src/tiles/blocks/tile.c", "return fmin(level->error, own)", "return 0.9 * fmin(level->error, own)", KINDS, "3d-tiles: the judge finds nothing"),
     ("judge: the root's region has a row more", "src/tiles/blocks/tileset.c", "block_rectangle(at->x0, at->y0 + side * at->dy,", "block_rectangle(at->x0, at->y0 + (side + 1) * at->dy,", KINDS, "3d-tiles: the judge finds nothing"),
-    ("judge: pixels are rounded to a side", "src/tiles/terrarium/pixels.c", "(metres - LOWEST) / g->step + 0.5, most", "(metres - LOWEST) / g->step + 0.25, most", KINDS, "terrarium: the judge finds nothing"),
+    ("judge: pixels are rounded to a side", "src/tiles/terrarium/pixels.c", "(metres - LOWEST) * g->per_step + 0.5, most", "(metres - LOWEST) * g->per_step + 0.25, most", KINDS, "terrarium: the judge finds nothing"),
 ]
