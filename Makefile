@@ -127,7 +127,7 @@ serve-demo: all ## the query service and its page on the demo's terrain, at http
 # ------------------------------------------------------------------------------------------------------ tests
 # Everything that a test may want of us in one archive; the linker takes what each one needs.
 TEST_PROGRAMS = $(patsubst tests/%.c,$(BUILD)/tests/%,$(wildcard tests/test_*.c))
-TEST_PARTS = $(BUILD)/tests/oracle.o $(SQL_LINKED) $(IMPORT) $(PLAIN) $(GEO)
+TEST_PARTS = $(BUILD)/tests/oracle.o $(SQL_LINKED) $(TILES) $(IMPORT) $(PLAIN) $(GEO)
 LIBS_TEST = -lcmocka -lgmp -lproj $(LIBS_CLI)
 
 $(BUILD)/tests/oracle.o: tests/oracle.c

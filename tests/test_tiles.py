@@ -749,6 +749,23 @@ db.execute("PRAGMA journal_mode = WAL")
 db.close()
 for name in ("tiles of a database with a log", "... are gone on with by the same command"):
     s.equal(name, s.run([s.RQT, "tiles", logged, "-o", s.temp("logged")]), ("", 0))
+# What changes the file and not the terrain: other tables, the log's end, VACUUM, a copy.
+db = s.connect(logged, load=False)
+db.execute("CREATE TABLE other AS SELECT 1 AS x")
+for name, sql in (("beside another table", "SELECT 1"), ("after a checkpoint", "PRAGMA wal_checkpoint(TRUNCATE)"), ("after VACUUM", "VACUUM")):
+    db.execute(sql).fetchall()
+    s.equal("... " + name, s.run([s.RQT, "tiles", logged, "-o", s.temp("logged")]), ("", 0))
+db.close()
+shutil.copy(logged, s.temp("copied.gpkg"))
+s.equal("... by a copy", s.run([s.RQT, "tiles", s.temp("copied.gpkg"), "-o", s.temp("logged")]), ("", 0))
+for name, sql in (("row", "UPDATE rqt_terrain SET source = 'elsewhere'"), ("summary", "UPDATE rqt_block_1 SET summary = (SELECT summary FROM rqt_block_1 WHERE id > 1) WHERE id = 1"),
+                  ("block", "UPDATE rqt_block_1 SET data = (SELECT data FROM rqt_block_1 WHERE id > 1) WHERE id = 1"), ("sea", "UPDATE rqt_fill_1 SET col0 = col0 + 1 WHERE id = 1")):
+    shutil.copy(logged, s.temp("changed.gpkg"))
+    db = s.connect(s.temp("changed.gpkg"), load=False)
+    db.execute(sql)
+    db.close()
+    out, status = s.run([s.RQT, "tiles", s.temp("changed.gpkg"), "-o", s.temp("logged")])
+    s.check("... not with another " + name, status == 1 and "of another state of it" in out, out)
 
 # --------------------------------------------------------------------------------------------------------- the service
 
@@ -777,5 +794,25 @@ s.check("a terrain without tiles says why", answer.status == 400 and "longitude 
 s.equal("the service lives", (server.is_alive(), server.ask("/healthz").status), (True, 200))
 server.process.terminate()
 s.equal("... and ends well", server.process.wait(30), 0)
+
+# A fiftieth of a second is too short to look at 900 x 900 samples without a triangle, but not for a part of them.
+bare = s.temp("bare.gpkg")
+s.import_terrain(bare, s.write_grid(s.temp("bare.asc"), [[None if (row + col) % 2 else 100 + row % 7 * col % 5 for col in range(900)] for row in range(900)], 12.3, 45.6, 1 / 1200, s.WGS84),
+                 name="bare")
+server = service.Service(bare, "--max-seconds", "0.02", "--workers", "1")
+told = []
+
+
+def is_answered():
+    told.append(server.ask("/collections/bare/tiles/quantized-mesh/layer.json"))
+    return told[-1].status != 503
+
+
+s.check("who asks again for what takes too long is answered", service.wait_until(is_answered) and told[-1].status == 200, told[-1].body[:200])
+s.check("... and was told to", any("ask again, and it goes on from here" in answer.detail() and answer.retry_after == "1" for answer in told[:-1]), [a.body[:200] for a in told[:3]])
+s.run([s.RQT, "tiles", bare, "-o", s.temp("bare")])
+s.equal("... with the same", told[-1].body, open(s.temp("bare") + "/layer.json", "rb").read())
+server.process.terminate()
+s.equal("... and the service ends well", server.process.wait(30), 0)
 
 s.finish()

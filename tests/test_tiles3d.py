@@ -103,6 +103,19 @@ class Tile:
         indices = [i for i, in accessor(gltf, buffer, primitive["indices"])]
         self.triangles = list(zip(indices[::3], indices[1::3], indices[2::3]))
         self.told = gltf["asset"]["extras"]["rqt"]
+        assert [set(p.get("extras", {})) for p in gltf["meshes"][0]["primitives"]] in ([set()], [set(), {"skirt"}]), gltf["meshes"]
+        self.walls, self.depth = [], 0
+        for skirt in gltf["meshes"][0]["primitives"][1:]:
+            self.depth = skirt["extras"]["skirt"]
+            ends = [(tx + x, -(tz + z), ty + y) for x, y, z in accessor(gltf, buffer, skirt["attributes"]["POSITION"])]
+            normals = [(x, -z, y) for x, y, z in accessor(gltf, buffer, skirt["attributes"]["NORMAL"])]
+            corners = [i for i, in accessor(gltf, buffer, skirt["indices"])]
+            of_place = dict(zip(self.xyz, self.normals))
+            for u, below_u, below_v, again, too, v in zip(*(corners[k::6] for k in range(6))):
+                assert (again, too, below_u, below_v) == (u, below_v, u + 1, v + 1), "a wall is two triangles"
+                assert all(normals[i] == normals[i + 1] for i in (u, v)) and (len(of_place) < len(self.xyz) or all(of_place[ends[i]] == normals[i] for i in (u, v)))
+                self.walls.append(tuple(ends[i] for i in (u, v, below_u, below_v)))
+            assert set(corners) == set(range(len(ends))) and len(corners) % 6 == 0
 
 
 class Subtree:
@@ -372,14 +385,18 @@ def check_terrain(t, is_whole):
     empty = [p for p in there if p not in tiles and p[0] == finest and exact_cover(t, t.cell(*p))[1]]
     s.equal(name + ": no tile of the last level that has such a triangle is left out", empty, [])
     check_seams(t)
+    check_skirts(t)
     # Regions.
     s.equal(name + ": regions lie in those above", [p for p in there if p[0] > 0 and not holds(there[p[0] - 1, p[1] // 2, p[2] // 2][1], there[p][1])][:5], [])
-    most = 0.0
+    most = hanging = 0.0
     for p, tile in tiles.items():
         region, slack = there[p][1], tile.told["step"]
         inner = [[sum(tile.xyz[v][k] for v in corners) / len(corners) for k in range(3)] for a, b, c in tile.triangles for corners in ((a, b), (b, c), (a, b, c))]
         most = max([most] + [outside(region, q) - slack for q in tile.xyz + inner if math.hypot(q[0], q[1]) > 1])
+        # Ends of walls are rounded twice.
+        hanging = max([hanging] + [outside(region, q) - 2 * slack for _, _, u, v in tile.walls for q in (u, v, [(a + b) / 2 for a, b in zip(u, v)]) if math.hypot(q[0], q[1]) > 1e6])
     s.check(name + ": tiles lie in their regions, chords and all", most <= 0, most)
+    s.check(name + ": and so do their skirts", hanging <= 0, hanging)
     valid = all(-math.pi <= r[0] <= math.pi and -math.pi <= r[2] <= math.pi and -math.pi / 2 <= r[1] <= r[3] <= math.pi / 2 and r[4] <= r[5]
                 for r in [t.set.region] + [r for _, r in there.values()])
     s.check(name + ": regions are on the globe", valid)
@@ -425,6 +442,100 @@ def check_seams(t):
                 lone = [p for p in both if sum(any(p == q for q, _ in side) for side in border) == 1]
                 different += [(level, x, y, other, p) for p in lone if not is_at_outline(t, p)]
     s.check("%s: what neighbours share is decoded to the same doubles (%d vertices)" % (t.name, compared), compared > 0 and not different, different[:5])
+
+
+def frame_at(p):
+    """East, north and up."""
+    lon, lat, _ = geodetic(*p)
+    return (-math.sin(lon), math.cos(lon), 0.0), (-math.sin(lat) * math.cos(lon), -math.sin(lat) * math.sin(lon), math.cos(lat)), \
+        (math.cos(lat) * math.cos(lon), math.cos(lat) * math.sin(lon), math.sin(lat))
+
+
+def lines_of(t, place):
+    """Of a cell's sides beside which tiles may be: (is it a row, which, on this side of the tile, how deep walls are)."""
+    c0, c1, r0, r1 = t.cell(*place)
+    is_around = abs((t.width - 1) * t.dx - 360) < 1e-6 and place[0] > 0
+    for is_row, at, end, sign in ((0, c0, t.width - 1, -1), (0, c1, t.width - 1, 1), (1, r0, t.height - 1, -1), (1, r1, t.height - 1, 1)):
+        if 0 < at < end or (is_around and not is_row):
+            level = 1 if at in (0, end) else next(level for level in range(1, 32) if at % (t.side >> level) == 0)
+            yield is_row, at, sign, t.set.json["extras"]["rqt"]["skirts"][level]
+
+
+def check_skirts(t):
+    """Walls hang from the sides of tiles, straight enough, deep enough; and beside a tile of any other level there is no gap."""
+    told = t.set.json["extras"]["rqt"]
+    s.check(t.name + ": walls of a level are twice as deep as what it is off, and roundings",
+            all(2 * e <= w <= 2 * e + 6 * step or w > 3e6 for e, step, w in zip(told["errors"], told["steps"], told["skirts"])), told)
+    wrong, skew, turned, marked, sides = [], [], [], [], {}
+    for place, tile in t.tiles.items():
+        cell, step = t.cell(*place), tile.told["step"]
+        sample = dict(zip(tile.xyz, t.samples_of(tile, cell)))
+        lines = list(lines_of(t, place))
+        on = {p: {(is_row, at) for is_row, at, _, _ in lines if sample[p][is_row] == at} for p in sample}
+        hung = {(u, v) for u, v, _, _ in tile.walls if None not in (sample[u][0], sample[v][0])}
+        wanted = {(tile.xyz[u], tile.xyz[v]) for a, b, c in tile.triangles for u, v in ((a, b), (b, c), (c, a))
+                  if on[tile.xyz[u]] & on[tile.xyz[v]] and None not in (sample[tile.xyz[u]][0], sample[tile.xyz[v]][0])}
+        if hung != wanted:
+            wrong.append((place, len(hung), len(wanted), list(hung ^ wanted)[:2]))
+        deepest = max([depth for is_row, at, _, depth in lines if any((is_row, at) in on[u] & on[v] for u, v in wanted)], default=0)
+        if wanted and not math.isclose(tile.depth, deepest, rel_tol=1e-14):
+            marked.append((place, tile.depth, deepest))
+        for top, below in {pair for u, v, bu, bv in tile.walls for pair in ((u, bu), (v, bv))}:
+            if sample[top][0] is None:
+                continue
+            east, north, up = frame_at(top)
+            depth = max(depth for is_row, at, _, depth in lines if (is_row, at) in on[top])
+            away = minus(below, top)
+            if abs(dot(away, up) + depth) > step + 1e-6 * depth or abs(dot(away, east)) > step + 1e-6 * depth or abs(dot(away, north)) > depth + step:
+                skew.append((place, sample[top], dot(away, up), depth, dot(away, east), dot(away, north)))
+        for is_row, at, sign, depth in lines:
+            along = [(sample[u][1 - is_row], sample[v][1 - is_row], u, v, bu, bv) for u, v, bu, bv in tile.walls
+                     if (is_row, at) in on[u] & on[v] and None not in (sample[u][0], sample[v][0])]
+            for _, _, u, v, below_u, below_v in along:
+                (ax, ay, az), (bx, by, bz) = minus(below_u, u), minus(below_v, u)
+                east, north, _ = frame_at(u)
+                if sign * dot((ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx), [-x for x in north] if is_row else east) <= 0:
+                    turned.append((place, is_row, at))
+            line = (is_row, at % (t.width - 1) if not is_row else at, depth)
+            sides.setdefault(line, {-1: [], 1: []})[sign].append((place, step, sorted(w if w[0] < w[1] else (w[1], w[0], w[3], w[2], w[5], w[4]) for w in along)))
+    s.equal(t.name + ": walls hang from the tile's edges on lines that other tiles may end at, and from no others", wrong[:3], [])
+    s.equal(t.name + ": so far down as their line's level has it, along the normal", skew[:3], [])
+    s.equal(t.name + ": and the skirt says how far that is", marked[:3], [])
+    s.equal(t.name + ": walls face outwards", turned[:3], [])
+    pairs, short, slits = 0, [], []
+    for (is_row, at, depth), line in sides.items():
+        for before in line[1]:
+            for after in line[-1]:
+                seen = walls_beside(before[2], after[2])
+                pairs += before[0][0] != after[0][0] and bool(seen)
+                for place, a, b in seen if depth < 3e6 else ():
+                    east, north, up = frame_at(a[0])
+                    outward, slack = [-x for x in north] if is_row else east, 2 * (before[1] + after[1])
+                    if min(dot(minus(b[0], a[1]), up), dot(minus(a[0], b[1]), up)) < 0:
+                        short.append((before[0], after[0], place))
+                    if dot(minus(b[0], a[0]), outward) > slack and dot(minus(b[1], a[1]), outward) > slack:
+                        slits.append((before[0], after[0], place, dot(minus(b[0], a[0]), outward), dot(minus(b[1], a[1]), outward)))
+    s.check("%s: beside a tile of any level the surface lies above the lower end of the other's wall (%d pairs of two levels)" % (t.name, pairs),
+            not short and pairs > 0, short[:3])
+    s.equal(t.name + ": where sides are apart, seen from above, their walls meet", slits[:3], [])
+
+
+def walls_beside(one, other):
+    """Places along a line, and what two tiles have there: (top, lower end) of each; at what bends in either, and half way."""
+    found, i, j = [], 0, 0
+    while i < len(one) and j < len(other):
+        low, high = max(one[i][0], other[j][0]), min(one[i][1], other[j][1])
+        for at in (low, (low + high) / 2, high) if low < high else ():
+            both = []
+            for first, last, u, v, below_u, below_v in (one[i], other[j]):
+                w = (at - first) / (last - first)
+                both.append([[p[k] + w * (q[k] - p[k]) for k in range(3)] for p, q in ((u, v), (below_u, below_v))])
+            found.append((at, *both))
+        if one[i][1] < other[j][1]:
+            i += 1
+        else:
+            j += 1
+    return found
 
 
 def is_at_outline(t, p):

@@ -15,9 +15,14 @@ enum { MOST_HEADER = 256 };
 enum { KIND = 3, TILE_SEGMENTS = 7 }; /* a path with a folder has one more */
 
 /* What the room tiles was asked for, as the answer; code is its own. */
-static void finish(request *r, const terrain *t, const tile_kind *kind, int code, char *sentence,
+static void finish(request *r, const terrain *t, const tile_kind *kind, const tiles *all, int code, char *sentence,
                    tile_bytes *bytes) {
-    if (code != SQLITE_OK)
+    if ((code & 0xFF) == SQLITE_INTERRUPT && tiles_goes_on(all) && !pool_is_hurried(r->service->pool))
+        answer_problem(r, MHD_HTTP_SERVICE_UNAVAILABLE,
+                       "which tiles the terrain has takes longer than %g s to find: ask again, and it goes on from "
+                       "here",
+                       r->service->options.max_seconds);
+    else if (code != SQLITE_OK)
         database_failed(t->database, r, code, sentence ? sentence : sqlite3_errstr(code));
     else if (bytes->size == 0)
         answer_problem(r, MHD_HTTP_NOT_FOUND, "the terrain has no such tile; %s tells which there are",
@@ -94,7 +99,7 @@ static void answer_series(worker *w, request *r, const tile_kind *kind, int seri
             code = make(all, r, series, &bytes, &sentence);
             tiles_end(all);
         }
-        finish(r, &t, kind, code, sentence, &bytes);
+        finish(r, &t, kind, all, code, sentence, &bytes);
     }
     terrain_end(&t);
 }

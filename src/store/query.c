@@ -9,6 +9,7 @@
  */
 #include "internal.h"
 
+#include <stdlib.h>
 #include <string.h>
 
 static int answers_statement(store *s, const store_terrain *t, rqt_outline outline, sqlite3_stmt **out,
@@ -307,45 +308,94 @@ int store_query_tables(store *s, const store_terrain *t, store_question *questio
     return code;
 }
 
-/* ------------------------------------------------------------------------------------- covered, and by how much */
+/* ------------------------------------------------------------------------------------------- which cells it meets
+ */
 
-/* Leaves over the cell of a block that answers have selected vertices of the block or its corners for their own,
- * and perhaps one of the two vertices outside of it that its summary has (core/query.c). When all of those are
- * valid, all leaves are kept, and the mesh has no gap over the cell as far as there are samples; when all of the
- * block are void no leaf is kept, for each has two corners of it at least. */
-static int cover_of(store *s, const store_terrain *t, const rqt_answer *answer, store_cover *cover, char **error) {
+typedef struct covered {
+    bool all, nothing;
+} covered;
+
+/* Where a vertex inside the cell of a block is selected its centre is, and both corners in the middle of sides of
+ * its parent, on which the centre depends: so all leaves over the cell have vertices of the block for their corners
+ * (core/query.c). When none of them is void all leaves are kept, and the mesh has no gap there as far as there are
+ * samples; when all are no leaf is. */
+static int cover_of(store *s, const store_terrain *t, rqt_block_number number, covered *cover, char **error) {
     const uint8_t *bytes;
     int size;
-    rqt_block_header header;
-    int code = store_block_bytes(s, t, answer->number, &bytes, &size, error);
+    rqt_block_header header = {0};
+    int code = store_block_bytes(s, t, number, &bytes, &size, error);
     if (code == SQLITE_OK && rqt_block_info(bytes, (size_t)size, &header, NULL) != RQT_OK)
-        code = store_fail(error, SQLITE_CORRUPT_VTAB, "terrain %s is damaged: block %llu", t->name, answer->number);
+        code = store_fail(error, SQLITE_CORRUPT_VTAB, "terrain %s is damaged: block %llu", t->name, number);
     sqlite3_reset(store_statements(s, t)->bytes);
-    uint8_t all = RQT_VALID;
-    for (int i = 0; i < 2 && answer->number > 1; i++) all &= answer->summary.far[i].flags;
-    *cover = STORE_COVER_UNKNOWN;
-    if (code == SQLITE_OK && header.all_void) *cover = STORE_COVER_NOTHING;
-    if (code == SQLITE_OK && !header.has_voids && !header.all_void && all) *cover = STORE_COVER_ALL;
+    *cover = (covered){.all = !header.has_voids && !header.all_void, .nothing = header.all_void};
     return code;
 }
 
-int store_covers(store *s, const store_terrain *t, const int32_t box[4], double eps,
-                 const store_query_options *options, store_cover *cover, char **error) {
+static int mark_answer(store *s, const store_terrain *t, const rqt_query *query, const rqt_answer *answer,
+                       rqt_cells *cells, char **error) {
+    rqt_block_place place;
+    const rqt_block *block = NULL;
+    covered cover = {false, false};
+    int code = SQLITE_OK, read;
+    (void)rqt_block_locate(&t->lattice, t->k, answer->number, &place);
+    if (!rqt_cells_lack(cells, &t->lattice, &place)) return SQLITE_OK;
+    if (rqt_query_selects_inside(query, answer)) {
+        if (store_is_interrupted(s, &code)) return code;
+        code = cover_of(s, t, answer->number, &cover, error);
+        if (code == SQLITE_OK && !cover.all && !cover.nothing)
+            code = store_get_block(s, t, answer->number, &block, &read, error);
+    }
+    if (code != SQLITE_OK) return code;
+    if (cover.all)
+        rqt_cells_fill(cells, &t->lattice, &place);
+    else if (!cover.nothing)
+        rqt_query_mark(query, answer, block, cells);
+    return SQLITE_OK;
+}
+
+static int by_number(const void *a, const void *b) {
+    const rqt_answer *p = a, *q = b;
+    return (p->number > q->number) - (p->number < q->number);
+}
+
+/* The box of all cells, grown outward to whole samples. */
+static void box_of(const rqt_cells *cells, int32_t box[4]) {
+    const int64_t unit = INT64_C(1) << 20;
+    box[0] = (int32_t)(cells->x[0] / unit);
+    box[1] = (int32_t)((cells->x[cells->columns] + unit - 1) / unit);
+    box[2] = (int32_t)(cells->y[0] / unit);
+    box[3] = (int32_t)((cells->y[cells->rows] + unit - 1) / unit);
+}
+
+int store_mark(store *s, const store_terrain *t, double eps, const store_query_options *options, rqt_cells *cells,
+               rqt_block_number *last, char **error) {
+    rqt_query query = {.lattice = t->lattice,
+                       .k = t->k,
+                       .eps = rqt_code_eps(eps, t->quantum_error),
+                       .rule = options->rule,
+                       .select = RQT_SELECT_THRESHOLD,
+                       .outline = options->outline};
     answer_list list = {0};
-    *cover = STORE_COVER_UNKNOWN;
+    int32_t box[4];
+    char *sentence = NULL;
     int code = store_begin_on(s, t, error);
     if (code != SQLITE_OK) return code;
-    code = find_answers(s, t, box, options->outline, rqt_code_eps(eps, t->quantum_error), &list, error);
+    box_of(cells, box);
+    code = find_answers(s, t, box, options->outline, query.eps, &list, &sentence);
     if (code == SQLITE_OK && options->rule && rqt_rule_set_eps(options->rule, eps) == RQT_OK)
-        code = refine_answers(s, t, box, options->outline, options->rule, &list, error);
+        code = refine_answers(s, t, box, options->outline, options->rule, &list, &sentence);
+    if (list.count > 0) qsort(list.rows, list.count, sizeof *list.rows, by_number);
     for (size_t i = 0; i < list.count && code == SQLITE_OK; i++) {
-        store_cover one;
-        code = cover_of(s, t, &list.rows[i], &one, error);
-        if (i == 0) *cover = one;
-        if (one != *cover) *cover = STORE_COVER_UNKNOWN;
-        if (*cover == STORE_COVER_UNKNOWN) break;
+        if (list.rows[i].number <= *last) continue;
+        code = mark_answer(s, t, &query, &list.rows[i], cells, &sentence);
+        if (code == SQLITE_OK) *last = list.rows[i].number;
     }
     sqlite3_free(list.rows);
     store_end(s);
+    if (code != SQLITE_OK && error && sentence) {
+        *error = sentence;
+        sentence = NULL;
+    }
+    sqlite3_free(sentence);
     return code;
 }

@@ -106,12 +106,10 @@ void store_reads_free(store_reads *reads);
 /* The patch of region at eps (metres; checked here: NaN and negative are SQLITE_ERROR). reads may be NULL. */
 int store_query(store *s, const store_terrain *t, const rqt_region *region, double eps,
                 const store_query_options *options, rqt_patch *patch, store_reads *reads, char **error);
-/* How much of a box of samples (x0, x1, y0, y1, inside the raster) that mesh covers, as far as it is known without
- * making it: the blocks that answer have voids or have none. options: those of metric exact and select threshold.
- */
-typedef enum store_cover { STORE_COVER_UNKNOWN, STORE_COVER_ALL, STORE_COVER_NOTHING } store_cover;
-int store_covers(store *s, const store_terrain *t, const int32_t box[4], double eps,
-                 const store_query_options *options, store_cover *cover, char **error);
+/* Marks the cells in which that mesh has triangles; options: those of metric exact and select threshold. *last: 0,
+ * or, with the marks as they are, what a call that was interrupted has left: this one goes on from there. */
+int store_mark(store *s, const store_terrain *t, double eps, const store_query_options *options, rqt_cells *cells,
+               rqt_block_number *last, char **error);
 /* A query within a budget: the mesh of the smallest eps' >= eps that has at most max_vertices (>= 4) vertices in
  * the patch. *achieved: eps' in metres, eps itself when that fits. SQLITE_ERROR when even infinite eps needs more.
  */
@@ -182,6 +180,10 @@ typedef struct store_finding {
 /* Everything that can be checked without the source: see check.c. tell returns false to stop. */
 int store_check(store *s, const store_terrain *t, bool (*tell)(void *context, const store_finding *finding),
                 void *context, char **error);
+
+/* A number that two states of a terrain have in common when all that is stored of it is the same, and, as numbers
+ * of 64 bits go, only then. Reads a page of each block. */
+int store_digest(store *s, const store_terrain *t, uint64_t *digest, char **error);
 
 /* How many samples of the terrain were no data: [0] STORE_FILLED, [1] STORE_SEA. */
 int store_fill_counts(store *s, const store_terrain *t, int64_t counts[2], char **error);

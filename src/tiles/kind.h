@@ -24,6 +24,7 @@ typedef struct kept_plan {
     char name[64];
     uint64_t state; /* store_state when it was made; 0: not to be kept */
     void *plan;     /* NULL: none */
+    bool is_whole;  /* false: interrupted while it was made */
 } kept_plan;
 struct tiles {
     sqlite3 *db;
@@ -32,12 +33,14 @@ struct tiles {
     const store_terrain *terrain; /* likewise */
     void *plan;                   /* likewise: the kind's own */
     int last;                     /* likewise: of tiles_tell */
+    bool goes_on;                 /* tiles_goes_on */
     kept_plan kept[KEPT_PLANS];
     int next; /* place of the plan that goes next */
 };
 
 /* What a kind has to know. t has its terrain and, but for plan_create, its plan. */
 typedef struct tile_functions {
+    /* *plan: NULL, or what it has left there when it was interrupted; then it goes on from there. */
     int (*plan_create)(tiles *t, void **plan, char **error);
     void (*plan_free)(void *plan); /* NULL is passed over */
     int (*finest)(const tiles *t);
@@ -65,9 +68,10 @@ void tiles_add_attribution(const store_terrain *t, struct cJSON *document);
 void tiles_add_bounds(const store_terrain *t, double most_latitude, struct cJSON *document);
 /* The document's text as the answer; releases it and the JSON. */
 int tiles_print(struct cJSON *document, tile_bytes *out);
-/* Has the mesh of eps a triangle in a region? Looks no further than the first. */
-int tiles_has_triangle(tiles *t, const rqt_region *region, double eps, const store_query_options *options,
-                       bool *is_there, char **error);
+/* Has the mesh of eps a triangle in a box of samples (west, east, north, south; cut at the raster's end)? *last: as
+ * of store_mark. */
+int tiles_has_triangle(tiles *t, const int32_t box[4], double eps, const store_query_options *options,
+                       rqt_block_number *last, bool *is_there, char **error);
 /* Ranges as they are found; items are to be released with sqlite3_free. */
 typedef struct range_list {
     tile_range *items;

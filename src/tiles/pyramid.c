@@ -4,7 +4,7 @@
  * Workers take pieces of columns, each with a connection of its own; a tile's bytes depend on nothing but the
  * terrain, so it does not matter which makes it. Each file is written beside its place and renamed: it is there
  * whole or not at all, and what is there need not be made again. FOLDER/.rqt-tiles says of what the tiles are:
- * terrain, state of the database, options. A folder that says something else, or holds files and says nothing, is
+ * terrain, its state, options. A folder that says something else, or holds files and says nothing, is
  * another's, and is refused; while somebody works in it the file is locked. The document comes last, so a folder
  * that has it is complete.
  */
@@ -135,29 +135,25 @@ static int pack(tile_bytes *b) {
 
 /* ---------------------------------------------------------------------------------------------- description -- */
 
-/* What the tiles are of. A database is taken for another one when its file is: bytes, time. */
-static char *describe_job(const tiles_job *job, const tiles *t, int last) {
-    struct stat file = {0}, log = {0};
-    char path[MOST_PATH];
-    snprintf(path, sizeof path, "%s-wal", job->database);
-    /* A log without bytes comes and goes with readers. */
-    if (stat(job->database, &file) || stat(path, &log) || log.st_size == 0) log = (struct stat){0};
-    return sqlite3_mprintf(
-        "rqt %s\n%s of terrain %s of %.64s\ndatabase %lld bytes, %lld.%09ld s, log %lld bytes, %lld.%09ld s\n"
-        "levels %d to %d%s%s%s\n",
-        RQT_VERSION, job->kind->name, t->terrain->name, t->terrain->created, (long long)file.st_size,
-        (long long)file.st_mtim.tv_sec, (long)file.st_mtim.tv_nsec, (long long)log.st_size,
-        (long long)log.st_mtim.tv_sec, (long)log.st_mtim.tv_nsec, job->first, last, job->gzip ? ", gzip" : "",
-        job->url ? " at " : "", job->url ? job->url : "");
+/* What the tiles are of: bytes are a function of the terrain alone, wherever its file is and whatever its time. */
+static int describe_job(const tiles_job *job, const tiles *t, int last, char **description, char **error) {
+    uint64_t digest;
+    const int code = store_digest(t->store, t->terrain, &digest, error);
+    *description =
+        code == SQLITE_OK
+            ? sqlite3_mprintf("rqt %s\n%s of terrain %s of %.64s\nstate %016llx\nlevels %d to %d%s%s%s\n",
+                              RQT_VERSION, job->kind->name, t->terrain->name, t->terrain->created,
+                              (unsigned long long)digest, job->first, last, job->gzip ? ", gzip" : "",
+                              job->url ? " at " : "", job->url ? job->url : "")
+            : NULL;
+    return code == SQLITE_OK && !*description ? SQLITE_NOMEM : code;
 }
 
-/* Does a connection that has begun to read see what the tiles are of? Asked after it has begun: a commit in between
- * changes the file. */
+/* Does a connection that has begun to read see what the tiles are of? */
 static int check_state(const pyramid *p, const tiles *t, char **error) {
-    char *now = describe_job(p->job, t, p->last);
-    const int code = !now                               ? SQLITE_NOMEM
-                     : strcmp(now, p->description) == 0 ? SQLITE_OK
-                                                        : tiles_fail(error, CHANGED);
+    char *now;
+    int code = describe_job(p->job, t, p->last, &now, error);
+    if (code == SQLITE_OK && strcmp(now, p->description) != 0) code = tiles_fail(error, CHANGED);
     sqlite3_free(now);
     return code;
 }
@@ -367,11 +363,10 @@ static int claim_folder(const tiles_job *job, const char *description, int *file
     if ((size_t)n < size && memcmp(there, description, (size_t)n) == 0) /* new, or killed at this very place */
         return pwrite(*file, description, size, 0) == (ssize_t)size ? SQLITE_OK : fail_file(error, path);
     if ((size_t)n == size && memcmp(there, description, size) == 0) return SQLITE_OK;
-    return tiles_fail(
-        error,
-        "%s holds tiles of another terrain, of another state of the database or of other options: give "
-        "another folder, or remove it",
-        job->folder);
+    return tiles_fail(error,
+                      "%s holds tiles of another terrain, of another state of it or of other options: give "
+                      "another folder, or remove it",
+                      job->folder);
 }
 
 static int write_document(tiles *t, const tiles_job *job, int last, char **error) {
@@ -382,15 +377,6 @@ static int write_document(tiles *t, const tiles_job *job, int last, char **error
     if (code == SQLITE_OK) code = write_file(path, document.bytes, document.size, error);
     sqlite3_free(document.bytes);
     return code;
-}
-
-/* t may have begun to read before a commit that the description knows of. Now it begins after it. */
-static int begin_again(const pyramid *p, tiles *t, int finest, char **error) {
-    tiles_end(t);
-    int code = tiles_begin(t, p->job->kind, p->job->terrain, error);
-    if (code != SQLITE_OK) return code;
-    code = check_state(p, t, error);
-    return code == SQLITE_OK && tiles_finest(t) != finest ? tiles_fail(error, CHANGED) : code;
 }
 
 static int write_all(pyramid *p, tiles *t, tiles_report *report, char **error) {
@@ -404,8 +390,7 @@ static int write_all(pyramid *p, tiles *t, tiles_report *report, char **error) {
         return tiles_fail(error, "%s needs no URL: its addresses are relative", job->kind->name);
     if (job->kind->is_whole && (job->first > 0 || p->last < finest))
         return tiles_fail(error, "%s has all levels, 0 to %d, or none", job->kind->name, finest);
-    p->description = describe_job(job, t, p->last);
-    int code = p->description ? begin_again(p, t, finest, error) : SQLITE_NOMEM;
+    int code = describe_job(job, t, p->last, &p->description, error);
     if (code == SQLITE_OK) code = claim_folder(job, p->description, &file, error);
     if (code == SQLITE_OK) code = list_stretches(p, t, &report->tiles, error);
     if (code == SQLITE_OK) code = run_workers(p, report->tiles, error);

@@ -125,21 +125,16 @@ int tiles_print(cJSON *document, tile_bytes *out) {
     return out->bytes ? SQLITE_OK : SQLITE_NOMEM;
 }
 
-int tiles_has_triangle(tiles *t, const rqt_region *region, double eps, const store_query_options *options,
-                       bool *is_there, char **error) {
-    store_limits *limits = store_limits_of(t->store);
-    const int64_t before = limits->triangles;
-    rqt_patch patch = {0};
-    limits->triangles = 1; /* more is not looked for */
-    int code = store_query(t->store, t->terrain, region, eps, options, &patch, NULL, error);
-    limits->triangles = before;
-    *is_there = code == SQLITE_TOOBIG || patch.triangle_count > 0;
-    if (code == SQLITE_TOOBIG) {
-        sqlite3_free(*error);
-        *error = NULL;
-        code = SQLITE_OK;
-    }
-    store_keep(t->store, &patch);
+int tiles_has_triangle(tiles *t, const int32_t box[4], double eps, const store_query_options *options,
+                       rqt_block_number *last, bool *is_there, char **error) {
+    const rqt_vertex from = {box[0], box[2]},
+                     to = rqt_vertex_clamp(&t->terrain->lattice, (rqt_vertex){box[1], box[3]});
+    const int64_t unit = INT64_C(1) << 20, x[2] = {from.x * unit, to.x * unit}, y[2] = {from.y * unit, to.y * unit};
+    uint8_t mark = 0;
+    rqt_cells cell = {x, y, 1, 1, &mark};
+    const bool has_area = from.x < to.x && from.y < to.y;
+    const int code = has_area ? store_mark(t->store, t->terrain, eps, options, &cell, last, error) : SQLITE_OK;
+    *is_there = mark;
     return code;
 }
 
@@ -186,24 +181,34 @@ void tiles_limit(tiles *t, int64_t triangles) {
     store_limits_of(t->store)->triangles = triangles;
 }
 
-/* The plan that was made of this terrain as it is now, or a new one in the place of the oldest. */
-static int find_plan(tiles *t, char **error) {
+/* Where the plan of this terrain as it is now is kept; if there is none, the place of the oldest. */
+static kept_plan *find_place(tiles *t) {
     const uint64_t state = store_state(t->store);
     for (int i = 0; i < KEPT_PLANS; i++) {
-        const kept_plan *kept = &t->kept[i];
-        if (kept->kind != t->kind || !state || kept->state != state) continue;
-        if (strcmp(kept->name, t->terrain->name) != 0) continue;
-        t->plan = kept->plan;
-        return SQLITE_OK;
+        kept_plan *kept = &t->kept[i];
+        if (kept->kind == t->kind && state && kept->state == state && !strcmp(kept->name, t->terrain->name))
+            return kept;
     }
     kept_plan *now = &t->kept[t->next];
     forget(now);
-    const int code = t->kind->functions->plan_create(t, &t->plan, error);
-    if (code != SQLITE_OK) return code;
-    *now = (kept_plan){.kind = t->kind, .state = state, .plan = t->plan};
+    *now = (kept_plan){.kind = t->kind, .state = state};
     snprintf(now->name, sizeof now->name, "%s", t->terrain->name);
     t->next = (t->next + 1) % KEPT_PLANS;
-    return SQLITE_OK;
+    return now;
+}
+
+static int find_plan(tiles *t, char **error) {
+    kept_plan *kept = find_place(t);
+    int code = SQLITE_OK;
+    if (!kept->is_whole) code = t->kind->functions->plan_create(t, &kept->plan, error);
+    kept->is_whole = code == SQLITE_OK;
+    if (kept->is_whole)
+        t->plan = kept->plan;
+    else if (kept->plan)
+        t->goes_on = true;
+    else
+        forget(kept);
+    return code;
 }
 
 int tiles_begin(tiles *t, const tile_kind *kind, const char *terrain, char **error) {
@@ -211,6 +216,7 @@ int tiles_begin(tiles *t, const tile_kind *kind, const char *terrain, char **err
     if (code != SQLITE_OK) return code;
     t->kind = kind;
     t->last = TILES_LEVELS;
+    t->goes_on = false;
     code = store_find(t->store, terrain, &t->terrain, error);
     if (code == SQLITE_OK) code = find_plan(t, error);
     if (code != SQLITE_OK) tiles_end(t);
@@ -228,6 +234,10 @@ void tiles_tell(tiles *t, int last) {
     t->last = last;
 }
 
+bool tiles_goes_on(const tiles *t) {
+    return t->goes_on;
+}
+
 int tiles_finest(const tiles *t) {
     return t->kind->functions->finest(t);
 }
@@ -235,6 +245,7 @@ int tiles_finest(const tiles *t) {
 int tiles_available(tiles *t, int series, int z, const tile_range **ranges, size_t *count, char **error) {
     *ranges = NULL;
     *count = 0;
+    t->goes_on = false;
     if (z < 0 || z > tiles_finest(t)) return SQLITE_OK;
     return t->kind->functions->available(t, series, z, ranges, count, error);
 }
@@ -242,11 +253,13 @@ int tiles_available(tiles *t, int series, int z, const tile_range **ranges, size
 int tiles_document(tiles *t, const char *root, int first, int last, tile_bytes *out, char **error) {
     const int finest = tiles_finest(t);
     *out = (tile_bytes){0};
+    t->goes_on = false;
     return t->kind->functions->document(t, root, first, last > finest ? finest : last, out, error);
 }
 
 int tiles_make(tiles *t, int series, int z, int32_t x, int32_t y, tile_bytes *out, char **error) {
     *out = (tile_bytes){0};
+    t->goes_on = false;
     if (z < 0 || z > tiles_finest(t) || x < 0 || y < 0) return SQLITE_OK;
     return t->kind->functions->make(t, series, z, x, y, out, error);
 }

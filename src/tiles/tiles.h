@@ -73,6 +73,9 @@ int tiles_available(tiles *t, int series, int z, const tile_range **ranges, size
 /* The description of levels first..last for clients; what addresses in it begin with ("": they are relative to it).
  */
 int tiles_document(tiles *t, const char *root, int first, int last, tile_bytes *out, char **error);
+/* One of these, or tiles_begin, has ended with SQLITE_INTERRUPT: what it has found is kept while the terrain stays
+ * as it is, and it goes on from there when it is called again, after tiles_begin. */
+bool tiles_goes_on(const tiles *t);
 /* One tile. Any z, x, y may be asked for. */
 int tiles_make(tiles *t, int series, int z, int32_t x, int32_t y, tile_bytes *out, char **error);
 

@@ -9,7 +9,7 @@ MUTANTS = [
     ("judge: ... heights of its own on either side", SEAM, "v->q = plan->seam[v->row];", "", JUDGE, "F28_a_terrain_around_the_earth"),
     ("judge: ... and what they differ by is not stated", SEAM, "most = plan->merging;", "most = 0;", JUDGE, "F28_a_ring_of_rough"),
     ("judge: normals of the antimeridian are one side's", GLOBE, "const bool is_seam = plan_of(t)->seam &&", "const bool is_seam = false &&", JUDGE, "F28_a_terrain_around_the_earth"),
-    ("judge: terrains of voids have no first tile", PLAN, "while (code == SQLITE_OK && !is_there && most > cell / 2)", "while (code != SQLITE_OK)", JUDGE, "F18_one_valid_half_cell"),
+    ("judge: terrains of voids have no first tile", PLAN, "if (is_there || plan->ground.eps <= cell / 2) break;", "if (plan) break;", JUDGE, "F18_one_valid_half_cell"),
     ("judge: terrains may go around twice", TILES, "e.east - e.west > 360 * most", "e.east - e.west > 3600 * most", JUDGE, "it goes around the Earth more than once"),
     ("judge: there is land beyond the pole", TILES, "e.north > 90 * most", "e.north > 900 * most", JUDGE, "it has latitudes beyond a pole"),
     ("judge: the horizon point is exact, and then rounded", GLOBE, "most * (1 + 1e-7)", "most * (1 - 1e-6)", JUDGE, "the judge finds nothing"),

@@ -1,6 +1,7 @@
 """Mutants of the tiles: see ../mutants.py."""
 
-COMMON, TILES, COVERED = "src/tiles/tiles.c", "test_tiles.py", "boxes_are_covered_as_the_mesh_covers_them"
+COMMON, TILES, MARKED = "src/tiles/tiles.c", "test_tiles.py", "cells_are_marked_where_the_mesh_has_triangles"
+QUERY, CELLS = "src/store/query.c", "src/core/cells.c"
 PLAN, MESH, GLOBE, WATER, ENCODE, LAYER = ("src/tiles/quantized_mesh/%s.c" % name for name in ("plan", "mesh", "globe", "water", "encode", "layer"))
 PYRAMID, EARTH = "src/tiles/pyramid.c", "src/tiles/earth.c"
 
@@ -42,24 +43,35 @@ MUTANTS = [
     ("tiles: water masks are whole", WATER, "== 0 ? 1 :", "== 0 ? WATER_SIDE * WATER_SIDE :", TILES, "one byte of it"),
     # which there are
     ("tiles: rows of layer.json begin one further north", LAYER, 'cJSON_AddNumberToObject(range, "startY", ranges[i].y0);', 'cJSON_AddNumberToObject(range, "startY", ranges[i].y0 + 1);', TILES, "the same tiles"),
-    ("tiles: tiles of voids are listed", COMMON, "*is_there = code == SQLITE_TOOBIG || patch.triangle_count > 0;", "*is_there = true;", TILES, "the same tiles"),
-    ("tiles: squares of tiles are there when one is", LAYER, "if (cover == STORE_COVER_UNKNOWN && (r->x0", "if (false && (r->x0", TILES, "no others"),
-    ("tiles: squares are a row short", LAYER, "y1 - y < SQUARE ? y1 : y + SQUARE - 1", "y1 - y < SQUARE ? y1 : y + SQUARE - 2", TILES, "no others"),
-    ("covers: blocks with voids cover all", "src/store/query.c", "!header.has_voids && !header.all_void && all", "!header.all_void && all", "test_store_cover", COVERED),
-    ("covers: blocks with voids cover nothing", "src/store/query.c", "header.all_void) *cover", "(header.all_void || header.has_voids)) *cover", "test_store_cover", COVERED),
-    ("covers: corners beyond a block have data", "src/store/query.c", "i < 2 && answer->number > 1", "i < 0 && answer->number > 1", "test_store_cover", COVERED),
-    ("covers: one block speaks for all", "src/store/query.c", "if (one != *cover) *cover = STORE_COVER_UNKNOWN;", "", "test_store_cover", COVERED),
-    ("covers: blocks answer as without a rule", "src/store/query.c", "if (code == SQLITE_OK && options->rule && rqt_rule_set_eps(options->rule, eps) == RQT_OK)", "if (!options)",
-     "test_store_cover", COVERED),
+    ("tiles: tiles of voids are listed", CELLS, "return flags[a] & flags[l] & flags[r] & RQT_VALID;", "return true;", TILES, "the same tiles"),
+    ("tiles: squares are a column short", LAYER, "s->x + SQUARE - 1, s->y", "s->x + SQUARE - 2, s->y", TILES, "no others"),
+    ("tiles: bands are a row short", LAYER, "s->y + rows_of(s) - 1}", "s->y + rows_of(s) - 1 - (rows_of(s) == SQUARE)}", TILES, "no others"),
+    ("marks: blocks with voids cover all", QUERY, ".all = !header.has_voids && !header.all_void", ".all = !header.all_void", "test_store_mark", MARKED),
+    ("marks: blocks with voids cover nothing", QUERY, ".nothing = header.all_void}", ".nothing = header.all_void || header.has_voids}", "test_store_mark", MARKED),
+    ("marks: blocks answer as without a rule", QUERY, "if (code == SQLITE_OK && options->rule && rqt_rule_set_eps(options->rule, eps) == RQT_OK)", "if (!options)",
+     "test_store_mark", MARKED),
+    ("marks: a block that is asked is not asked again", QUERY, "if (code == SQLITE_OK) *last = list.rows[i].number;", "*last = list.rows[i].number;", "test_store_mark", MARKED),
+    ("marks: leaves of other blocks are not asked", CELLS, "mark_leaf(&m, &top, &near, &far, all);", "(void)far, (void)top;", "test_store_mark", MARKED),
+    ("marks: a cell that a leaf touches is marked", CELLS, "return dx * at_y - dy * at_x <= 0;", "return dx * at_y - dy * at_x < 0;", "test_store_mark", MARKED),
+    ("marks: leaves reach as far as their boxes", CELLS, "return dx * at_y - dy * at_x <= 0;", "return turn == 0;", "test_store_mark", MARKED),
+    ("marks: nothing is forced", CELLS, "if (error <= m->range.least && !m->range.forced) return false;", "if (error <= m->range.most) return false;", "test_store_mark", MARKED),
+    ("tiles: marks of an interrupted square are lost, and its blocks are not", LAYER, "    if (code != SQLITE_OK) return code;\n    const size_t width = (size_t)(all->x1",
+     "    if (code != SQLITE_OK) memset(s->marks, 0, sizeof s->marks);\n    if (code != SQLITE_OK) return code;\n    const size_t width = (size_t)(all->x1", "test_tiles_search", "a_search_goes_on_where_it_was_interrupted"),
+    ("tiles: nothing is kept of a search", LAYER, "t->goes_on = true;\n        return code;", "t->goes_on = true;\n        layer_search_free(*s);\n        *s = NULL;\n        return code;", "test_tiles_search",
+     "the_same_time_again_and_again_is_enough"),
+    ("tiles: nothing is kept of a plan", COMMON, "else if (kept->plan)\n        t->goes_on = true;", "else if (!kept)\n        t->goes_on = true;", "test_tiles_search", "the_same_time_again_and_again_is_enough"),
+    ("tiles: all tiles know of those below", "src/tiles/quantized_mesh/encode.c", "if (place->z == 0) {", "if (place->z >= 0) {", "test_tiles_search", "other_tiles_do_not_wait_for_it"),
     ("rules: rows of a block have the ranks of its first", "src/core/walk.c", "threshold[__builtin_ctz(v | (n - 1))]", "threshold[0]", "test_core_rule", "eps_lowered_by_rank_alone_is_its_definition"),
     ("normals: a row's metres are those of another", "src/store/normals.c", "if (k->row != row) {", "if (k->row < 0) {", "test_sql_normals.py", "normal"),
-    ("tiles: longitudes count once", PLAN, "*last = (int)ceil((e.east + 180) / 360);", "*last = 0;", TILES, "358.5"),
+    ("tiles: longitudes count once", PLAN, "(int)ceil((e.east + 180) / 360)};", "0};", TILES, "358.5"),
     ("tiles: a tile that touches the raster is listed", PLAN, "return (from > 0 ? from : 0) < (to < last ? to : last);", "return (from > 0 ? from : 0) <= (to < last ? to : last) + (1 << UNIT_BITS);", TILES,
      "the same tiles"),
     # to disk
     ("tiles: all is made again", PYRAMID, "if (lstat(path, &there) == 0 && S_ISREG(there.st_mode) && there.st_size > 0) return SQLITE_OK;", "(void)there;", TILES, "without making again"),
     ("tiles: anybody's folder will do", PYRAMID, "if ((size_t)n == size && memcmp(there, description, size) == 0) return SQLITE_OK;", "return SQLITE_OK;", TILES, "are not mixed in"),
     ("tiles: what nobody says anything of is ours", PYRAMID, "if (n == 0) code = check_empty(job->folder, error);", "if (n < 0) code = check_empty(job->folder, error);", TILES, "says nothing of its files"),
+    ("digest: blocks are alike", "src/store/digest.c", "if (code == SQLITE_OK) *h = mix(mix(*h, &size, sizeof size), header, (size_t)n);", "", TILES, "another block"),
+    ("digest: nothing was filled", "src/store/digest.c", "store_has_fill(s->db, t))", "!s)", TILES, "another sea"),
     ("tiles: two commands write into one folder", PYRAMID, "if (flock(*file, LOCK_EX | LOCK_NB))", "if (flock(*file, LOCK_UN))", TILES, "by one command at a time"),
     ("tiles: gzip is not asked for", PYRAMID, "if (p->job->gzip && !series->is_packed) code = pack(&tile);", "", TILES, "all tiles are compressed"),
     ("tiles: numbers of paths may begin with 0", "src/serve/endpoints.c", "|| (digits > 1 && *segment == '0')", "", TILES, "no tile at 00/1/0"),

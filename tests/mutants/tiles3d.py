@@ -23,7 +23,7 @@ MUTANTS = [
     ("3d-tiles: normals are those of glTF's other axis", GLB, "*p++ = (uint8_t)n[2];", "*p++ = (uint8_t)n[1];", TILES, "normals"),
     # places
     ("3d-tiles: rows count from the north", TILE, "(INT64_C(1) << level) - 1 - y", "y", TILES, "as the formats have them"),
-    ("3d-tiles: regions do not sink with their chords", TILE, "region[4] = relief->lowest + low - moved;", "region[4] = relief->lowest + low;", TILES, "lie in their regions"),
+    ("3d-tiles: regions do not sink with their chords", TILE, "region[4] = relief->lowest + low - moved - block_skirt_depth(t, tile);", "region[4] = relief->lowest + low - block_skirt_depth(t, tile);", TILES, "and so do their skirts"),
     ("3d-tiles: regions do not bulge to the pole", TILE, "box[3] + bulge, region", "box[3], region", TILES, "lie in their regions"),
     ("3d-tiles: a tile knows no more than the terrain", SUBTREE, "int code = block_relief(t, tile, relief, error);", "int code = SQLITE_OK;", TILES, "a tile tells the error"),
     ("3d-tiles: heights are the geoid's", MESH, "geo_frame_height(block_plan_of(t)->frame, place)", "place[2]", TILES, "geoid: every vertex is a sample"),
@@ -32,7 +32,7 @@ MUTANTS = [
     # availability
     ("3d-tiles: every tile has content", TILE, "return relief->is_mixed ? block_has_triangle(t, tile, has, error) : SQLITE_OK;", "const int code = relief->is_mixed ? block_has_triangle(t, tile, has, error) : SQLITE_OK;\n    *has = true;\n    return code;", TILES, "holes"),
     ("3d-tiles: no mixed tile has content", TILE, "return relief->is_mixed ? block_has_triangle(t, tile, has, error) : SQLITE_OK;", "const int code = relief->is_mixed ? block_has_triangle(t, tile, has, error) : SQLITE_OK;\n    *has = *has && !relief->is_mixed;\n    return code;", TILES, "holes"),
-    ("3d-tiles: blocks without voids have nothing", MESH, "*has = cover == STORE_COVER_ALL;", "*has = cover == STORE_COVER_NOTHING;", TILES, "lone: a void"),
+    ("3d-tiles: blocks without voids have nothing", "src/store/query.c", ".all = !header.has_voids", ".all = header.has_voids", TILES, "holes: subtrees and tiles"),
     ("3d-tiles: a cell without an outline is all valid", RELIEF, "relief->is_valid = summary->corner[0].flags & RQT_VALID;", "relief->is_valid = true;", TILES, "holes"),
     ("3d-tiles: bits are counted from the other end", SUBTREE, "(uint8_t)(1 << i % 8)", "(uint8_t)(128 >> i % 8)", TILES, "as the formats have them"),
     ("3d-tiles: x and y change places", SUBTREE, "x |= (m >> 2 * bit & 1) << bit;", "x |= (m >> (2 * bit + 1) & 1) << bit;", TILES, "as the formats have them"),

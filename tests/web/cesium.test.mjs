@@ -11,8 +11,9 @@ import {after, before, test} from 'node:test';
 import {PATIENCE, PHONE, SMALL, keepingShots, launch, openPage} from './browser.mjs';
 import {Dice} from './oracle.mjs';
 import {BUILD, ROOT, requirePackage} from './packages.mjs';
-import {differingPixels} from './picture.mjs';
+import {differingPixels, findGaps} from './picture.mjs';
 import {Service, sql} from './serve.mjs';
+import {vanishingPoint} from './space.mjs';
 
 const {default: decode} = requirePackage('@here/quantized-mesh-decoder');
 const RQT = process.env.RQT || join(BUILD, 'rqt');
@@ -269,6 +270,32 @@ test('3D Tiles: they are drawn, with the errors and regions of their subtrees, a
     await view.close();
 }));
 
+test('3D Tiles of different levels beside each other: nothing shows through', keepingShots('cesium-skirts', () => views, async () => {
+    const cameras = [
+        {longitude: -71.7057, latitude: 44.7832, height: 948, heading: 119, pitch: -12},
+        {longitude: -71.1006, latitude: 44.6298, height: 2202, heading: 227, pitch: -30},
+    ];
+    const view = await open(`?terrain=white&tiles=3d-tiles#camera=${Object.values(cameras[0])}`, {width: 240, height: 160});
+    await onMagenta(view);
+    const fovy = await view.page.evaluate(() => {
+        const {scene, surface} = window.rqtCesium.globe;
+        surface.tileset.maximumScreenSpaceError = 16; // as clients have it
+        return scene.camera.frustum.fovy * 180 / Math.PI;
+    });
+    for (const camera of cameras) {
+        await view.page.evaluate(c => window.rqtCesium.setCamera(c), camera);
+        await settled(view);
+        const {levels: {finest, coarsest}} = await state(view), picture = await view.picture(), {width, height} = picture;
+        assert.ok(finest - coarsest >= 2, `levels ${coarsest} to ${finest}`);
+        const {count, at, terrain} = findGaps(backgroundOf(picture), width, height, vanishingPoint({pitch: camera.pitch, fovy, width, height}));
+        assert.equal(count, 0, `levels ${coarsest} to ${finest}: background at ${at.join('; ')}`);
+        assert.ok(terrain > 0.7 * width * height && (camera.pitch < -20 || terrain < 0.9 * width * height), `${terrain} pixels of terrain`);
+    }
+    await view.shot('cesium-skirts');
+    assert.deepEqual(view.problems, []);
+    await view.close();
+}));
+
 // ---------------------------------------------------------------------------------------------------------------- page
 
 for (const [name, options] of [['white', SMALL], ['pyrenees', PHONE], ['world', SMALL]])
@@ -291,14 +318,22 @@ for (const [name, options] of [['white', SMALL], ['pyrenees', PHONE], ['world', 
         await view.close();
     }));
 
-test('neighbours of one level have no crack between them, without skirts', keepingShots('cesium-cracks', () => views, async () => {
-    const view = await open('?terrain=white');
+/** Nothing but the terrain, on a background of a colour that it never has. */
+async function onMagenta(view) {
     await view.page.evaluate(() => {
-        const {globe: {scene, globe}} = window.rqtCesium;
+        const {globe: {scene, globe, surface}} = window.rqtCesium;
         Object.assign(globe, {showSkirts: false, showGroundAtmosphere: false});
-        scene.primitives.show = scene.skyAtmosphere.show = scene.fog.enabled = false;
+        scene.skyAtmosphere.show = scene.fog.enabled = false;
+        for (let i = 0; i < scene.primitives.length; i++) scene.primitives.get(i).show = scene.primitives.get(i) === surface.tileset;
         Object.assign(scene.backgroundColor, {red: 1, green: 0, blue: 1});
     });
+}
+/** 1 where a picture shows the background. */
+const backgroundOf = ({rgba}) => Uint8Array.from({length: rgba.length / 4}, (_, i) => Math.min(rgba[4 * i], rgba[4 * i + 2]) - rgba[4 * i + 1] > 60 ? 1 : 0);
+
+test('neighbours of one level have no crack between them, without skirts', keepingShots('cesium-cracks', () => views, async () => {
+    const view = await open('?terrain=white');
+    await onMagenta(view);
     let seen = 0;
     for (const height of [30000, 36000, 42000]) {
         await view.page.evaluate(h => window.rqtCesium.setCamera({longitude: -71.45, latitude: 44.5, height: h, heading: 20, pitch: -90}), height);
@@ -306,9 +341,7 @@ test('neighbours of one level have no crack between them, without skirts', keepi
         const {levels: {finest, coarsest}} = await state(view);
         if (finest !== coarsest) continue;
         const tiles = await view.page.evaluate(() => window.rqtCesium.globe.globe._surface._tilesToRender.length);
-        const {rgba} = await view.picture();
-        let gaps = 0;
-        for (let i = 0; i < rgba.length; i += 4) gaps += Math.min(rgba[i], rgba[i + 2]) - rgba[i + 1] > 60;
+        const gaps = backgroundOf(await view.picture()).filter(is => is).length;
         assert.equal(gaps, 0, `from ${height} m, level ${finest}`);
         seen += tiles > 3;
         await view.shot('cesium-cracks');

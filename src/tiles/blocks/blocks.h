@@ -4,7 +4,8 @@
  *   plan.c     levels and their tolerances, steps of positions
  *   tile.c     one tile by the index alone: is it there, what is it off, where does it lie
  *   mesh.c     the terrain's mesh of a cell, in space
- *   glb.c      the same as glTF
+ *   skirt.c    walls that hang from its sides
+ *   glb.c      both as glTF
  *   subtree.c  availability and metadata of some levels of tiles
  *   tileset.c  the kind; tileset.json
  */
@@ -21,6 +22,7 @@ typedef struct block_level {
     double centre; /* what curvature takes from the two triangles that a cell is at least made of */
     double step;   /* positions are whole ones: a power of two */
     double round;  /* what rounding moves a vertex by, at most */
+    double wall;   /* how far walls hang down from sides of the level's cells (skirt.c) */
 } block_level;
 
 /* What all tiles of a terrain have in common. */
@@ -59,13 +61,13 @@ int block_has_content(tiles *t, block_tile tile, const store_relief *relief, boo
  */
 double block_error(const tiles *t, block_tile tile, const store_relief *relief);
 /* As 3D Tiles has regions: west, south, east, north in radians, lowest, highest in metres above the ellipsoid; the
- * tile's mesh lies in it, and so do the regions of the tiles below. */
+ * tile's mesh and its skirt lie in it, and so do the regions of the tiles below. */
 void block_region(const tiles *t, block_tile tile, const store_relief *relief, double region[6]);
 /* A box of longitudes and latitudes in degrees, as such a region's first four: longitudes in -180..180, west beyond
  * east across the antimeridian. */
 void block_rectangle(double west, double south, double east, double north, double region[4]);
 
-/* Has the mesh of a tile a triangle? By the blocks that answer, and if they do not say, up to the first one. */
+/* Has the mesh of a tile a triangle? By the blocks that answer. */
 int block_has_triangle(tiles *t, block_tile tile, bool *has, char **error);
 
 typedef struct block_mesh {
@@ -78,7 +80,22 @@ typedef struct block_mesh {
 int block_mesh_make(tiles *t, block_tile tile, block_mesh *mesh, char **error);
 void block_mesh_free(tiles *t, block_mesh *mesh);
 
-int block_glb_make(tiles *t, block_tile tile, const block_mesh *mesh, tile_bytes *out, char **error);
+/* The walls of a tile: no part of the mesh, of whose error they know nothing. */
+typedef struct block_skirt {
+    size_t vertex_count, triangle_count; /* 0: it has none */
+    int32_t *offset;                     /* as a mesh's; in turn a vertex of the mesh, and the one below it */
+    int8_t *normal;                      /* likewise: the mesh's, twice */
+    uint32_t *triangles;                 /* counter-clockwise seen from outside */
+    double depth;                        /* metres; of the deepest */
+} block_skirt;
+int block_skirt_make(const tiles *t, block_tile tile, const block_mesh *mesh, block_skirt *skirt);
+void block_skirt_free(block_skirt *skirt);
+/* No wall of the tile, or of those below, hangs further down: metres. */
+double block_skirt_depth(const tiles *t, block_tile tile);
+
+/* The mesh is the first primitive; the skirt, if there is one, the second. */
+int block_glb_make(tiles *t, block_tile tile, const block_mesh *mesh, const block_skirt *skirt, tile_bytes *out,
+                   char **error);
 /* The subtree whose root is the tile, which exists. */
 int subtree_make(tiles *t, block_tile tile, tile_bytes *out, char **error);
 

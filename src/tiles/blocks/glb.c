@@ -1,7 +1,13 @@
-/* glb.c - a tile's mesh as glTF 2.0, binary:
+/* glb.c - a tile's mesh and its skirt as glTF 2.0, binary:
  *
  *   'glTF', u32 2, u32 size;  u32 size, 'JSON', text, blanks to 4 bytes;  u32 size, 'BIN', the buffer, zeros to 4
- *   buffer: positions of all vertices, three floats each; normals, three i8 and a zero; indices, u16 where they fit
+ *   buffer, for each primitive: positions of all vertices, three floats each; normals, three i8 and a zero;
+ * indices, u16 where they fit, and zeros to 4
+ *
+ * Primitives. The first is the terrain, of which everything holds that is said of a tile. The second, which tiles
+ * have that have neighbours, is its skirt (skirt.c): walls that hide what levels differ by, with vertices and
+ * indices of its own. It has {"extras": {"skirt": DEPTH}}, in metres, so that whoever measures can leave it out.
+ * Its vertices are in pairs: one of the mesh, and the lower end of the wall there.
  *
  * Axes. Clients of 3D Tiles turn glTF's y-up into their z-up, (x, y, z) to (x, -z, y): so a geocentric (X, Y, Z) is
  * (X, Z, -Y) here.
@@ -28,9 +34,35 @@ static size_t padded(size_t size) {
     return (size + 3) / 4 * 4;
 }
 
+/* A primitive. */
+typedef struct part {
+    size_t vertex_count, index_count;
+    const int32_t *offset; /* and the rest as a block_mesh has them */
+    const int8_t *normal;
+    const uint32_t *indices;
+} part;
+
+enum { MOST_PARTS = 2 };
+typedef struct parts {
+    part of[MOST_PARTS];
+    int count;
+} parts;
+
+static parts list_parts(const block_mesh *mesh, const block_skirt *skirt) {
+    const rqt_patch *patch = &mesh->patch;
+    return (parts){
+        {{patch->vertex_count, 3 * patch->triangle_count, mesh->offset, mesh->normal, patch->triangles},
+         {skirt->vertex_count, 3 * skirt->triangle_count, skirt->offset, skirt->normal, skirt->triangles}},
+        skirt->triangle_count > 0 ? 2 : 1};
+}
+
 /* 65535 itself is kept free: it means restart in some libraries of graphics. */
-static size_t index_bytes(const block_mesh *mesh) {
-    return mesh->patch.vertex_count <= MOST_SHORT_INDEX ? 2 : 4;
+static size_t index_bytes(const part *p) {
+    return p->vertex_count <= MOST_SHORT_INDEX ? 2 : 4;
+}
+
+static size_t size_of_part(const part *p) {
+    return (POSITION_BYTES + NORMAL_BYTES) * p->vertex_count + padded(index_bytes(p) * p->index_count);
 }
 
 /* ---------------------------------------------------------------------------------------------------- JSON -- */
@@ -62,14 +94,16 @@ static void add_asset(const tiles *t, block_tile tile, double error, cJSON *json
     cJSON_AddItemToObject(told, "step", number(block_plan_of(t)->level[tile.level].step));
 }
 
-static void add_view(cJSON *views, size_t at, size_t size, int stride, int target) {
+/* A view of what comes next in the buffer. */
+static void add_view(cJSON *views, size_t *at, size_t size, int stride, int target) {
     cJSON *view = cJSON_CreateObject();
     cJSON_AddNumberToObject(view, "buffer", 0);
-    cJSON_AddNumberToObject(view, "byteOffset", (double)at);
+    cJSON_AddNumberToObject(view, "byteOffset", (double)*at);
     cJSON_AddNumberToObject(view, "byteLength", (double)size);
     if (stride) cJSON_AddNumberToObject(view, "byteStride", stride);
     cJSON_AddNumberToObject(view, "target", target);
     cJSON_AddItemToArray(views, view);
+    *at += padded(size);
 }
 
 static cJSON *add_accessor(cJSON *accessors, int component, size_t count, const char *type) {
@@ -89,10 +123,10 @@ static void turn(const double xyz[3], double out[3]) {
     out[2] = -xyz[1] + 0.0;
 }
 
-static void add_box(const block_mesh *mesh, double step, cJSON *positions) {
+static void add_box(const part *p, double step, cJSON *positions) {
     double low[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, high[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
-    for (size_t i = 0; i < mesh->patch.vertex_count; i++) {
-        const int32_t *o = mesh->offset + 3 * i;
+    for (size_t i = 0; i < p->vertex_count; i++) {
+        const int32_t *o = p->offset + 3 * i;
         const double xyz[3] = {o[0] * step, o[1] * step, o[2] * step};
         double at[3];
         turn(xyz, at);
@@ -117,33 +151,55 @@ static void add_scene(const block_mesh *mesh, cJSON *json) {
     cJSON_AddNumberToObject(node, "mesh", 0);
     add_numbers(node, "matrix", matrix, 16);
     cJSON_AddItemToArray(nodes, node);
-    cJSON_AddItemToObject(json, "meshes",
-                          cJSON_Parse("[{\"primitives\":[{\"attributes\":{\"POSITION\":0,\"NORMAL\":1},"
-                                      "\"indices\":2,\"material\":0,\"mode\":4}]}]"));
     cJSON_AddItemToObject(json, "materials",
                           cJSON_Parse("[{\"doubleSided\":true,\"pbrMetallicRoughness\":{\"baseColorFactor\":"
                                       "[0.6,0.58,0.5,1],\"metallicFactor\":0,\"roughnessFactor\":1}}]"));
 }
 
+/* With the accessors that come next. */
+static void add_primitive(const cJSON *accessors, double skirt, cJSON *primitives) {
+    const int first = cJSON_GetArraySize(accessors);
+    cJSON *primitive = cJSON_CreateObject(), *attributes = cJSON_AddObjectToObject(primitive, "attributes");
+    cJSON_AddNumberToObject(attributes, "POSITION", first);
+    cJSON_AddNumberToObject(attributes, "NORMAL", first + 1);
+    cJSON_AddNumberToObject(primitive, "indices", first + 2);
+    cJSON_AddNumberToObject(primitive, "material", 0);
+    cJSON_AddNumberToObject(primitive, "mode", 4);
+    if (skirt > 0) cJSON_AddItemToObject(cJSON_AddObjectToObject(primitive, "extras"), "skirt", number(skirt));
+    cJSON_AddItemToArray(primitives, primitive);
+}
+
+static void add_data(const part *p, double step, size_t *at, cJSON *accessors, cJSON *views) {
+    add_box(p, step, add_accessor(accessors, FLOAT, p->vertex_count, "VEC3"));
+    cJSON_AddTrueToObject(add_accessor(accessors, BYTE, p->vertex_count, "VEC3"), "normalized");
+    add_accessor(accessors, index_bytes(p) == 2 ? UNSIGNED_SHORT : UNSIGNED_INT, p->index_count, "SCALAR");
+    add_view(views, at, POSITION_BYTES * p->vertex_count, POSITION_BYTES, ARRAY);
+    add_view(views, at, NORMAL_BYTES * p->vertex_count, NORMAL_BYTES, ARRAY);
+    add_view(views, at, index_bytes(p) * p->index_count, 0, ELEMENTS);
+}
+
+static void add_parts(const parts *all, double step, double skirt, cJSON *json) {
+    cJSON *mesh = cJSON_CreateObject(), *primitives = cJSON_AddArrayToObject(mesh, "primitives");
+    cJSON_AddItemToArray(cJSON_AddArrayToObject(json, "meshes"), mesh);
+    cJSON *accessors = cJSON_AddArrayToObject(json, "accessors"),
+          *views = cJSON_AddArrayToObject(json, "bufferViews");
+    size_t size = 0;
+    for (int i = 0; i < all->count; i++) {
+        add_primitive(accessors, i > 0 ? skirt : 0, primitives);
+        add_data(&all->of[i], step, &size, accessors, views);
+    }
+    cJSON *buffers = cJSON_AddArrayToObject(json, "buffers"), *buffer = cJSON_CreateObject();
+    cJSON_AddNumberToObject(buffer, "byteLength", (double)size);
+    cJSON_AddItemToArray(buffers, buffer);
+}
+
 /* NULL: no memory. */
-static char *describe(const tiles *t, block_tile tile, double error, const block_mesh *mesh) {
-    const size_t vertices = mesh->patch.vertex_count, indices = 3 * mesh->patch.triangle_count;
-    const size_t positions = POSITION_BYTES * vertices, normals = NORMAL_BYTES * vertices,
-                 elements = index_bytes(mesh) * indices;
+static char *describe(const tiles *t, block_tile tile, double error, const block_mesh *mesh, const parts *all,
+                      double skirt) {
     cJSON *json = cJSON_CreateObject();
     add_asset(t, tile, error, json);
     add_scene(mesh, json);
-    cJSON *accessors = cJSON_AddArrayToObject(json, "accessors");
-    add_box(mesh, block_plan_of(t)->level[tile.level].step, add_accessor(accessors, FLOAT, vertices, "VEC3"));
-    cJSON_AddTrueToObject(add_accessor(accessors, BYTE, vertices, "VEC3"), "normalized");
-    add_accessor(accessors, index_bytes(mesh) == 2 ? UNSIGNED_SHORT : UNSIGNED_INT, indices, "SCALAR");
-    cJSON *views = cJSON_AddArrayToObject(json, "bufferViews");
-    add_view(views, 0, positions, POSITION_BYTES, ARRAY);
-    add_view(views, positions, normals, NORMAL_BYTES, ARRAY);
-    add_view(views, positions + normals, elements, 0, ELEMENTS);
-    cJSON *buffers = cJSON_AddArrayToObject(json, "buffers"), *buffer = cJSON_CreateObject();
-    cJSON_AddNumberToObject(buffer, "byteLength", (double)(positions + normals + elements));
-    cJSON_AddItemToArray(buffers, buffer);
+    add_parts(all, block_plan_of(t)->level[tile.level].step, skirt, json);
     char *text = cJSON_PrintUnformatted(json);
     cJSON_Delete(json);
     return text;
@@ -174,34 +230,39 @@ static uint8_t *put_chunk(uint8_t *p, size_t size, const char name[4]) {
     return p + 4;
 }
 
-static uint8_t *put_vertices(uint8_t *p, const block_mesh *mesh, double step) {
-    const size_t count = mesh->patch.vertex_count;
+static uint8_t *put_part(uint8_t *p, const part *all, double step) {
+    const size_t count = all->vertex_count;
     for (size_t i = 0; i < count; i++) {
-        const int32_t *o = mesh->offset + 3 * i;
+        const int32_t *o = all->offset + 3 * i;
         p = put_float(p, (float)(o[0] * step));
         p = put_float(p, (float)(o[2] * step));
         p = put_float(p, (float)(-o[1] * step));
     }
     for (size_t i = 0; i < count; i++) {
-        const int8_t *n = mesh->normal + 3 * i;
+        const int8_t *n = all->normal + 3 * i;
         *p++ = (uint8_t)n[0];
         *p++ = (uint8_t)n[2];
         *p++ = (uint8_t)-n[1];
         *p++ = 0;
     }
-    return p;
+    const size_t bytes = index_bytes(all) * all->index_count;
+    for (size_t i = 0; i < all->index_count; i++)
+        p = index_bytes(all) == 2 ? put_u16(p, all->indices[i]) : put_u32(p, all->indices[i]);
+    memset(p, 0, padded(bytes) - bytes);
+    return p + padded(bytes) - bytes;
 }
 
-int block_glb_make(tiles *t, block_tile tile, const block_mesh *mesh, tile_bytes *out, char **error) {
-    const rqt_patch *patch = &mesh->patch;
+int block_glb_make(tiles *t, block_tile tile, const block_mesh *mesh, const block_skirt *skirt, tile_bytes *out,
+                   char **error) {
     store_relief relief;
     int code = block_relief_from_root(t, tile, &relief, error);
     if (code != SQLITE_OK) return code;
-    char *text = describe(t, tile, block_error(t, tile, &relief), mesh);
+    const parts all = list_parts(mesh, skirt);
+    char *text = describe(t, tile, block_error(t, tile, &relief), mesh, &all, skirt->depth);
     const size_t length = text ? strlen(text) : 0;
-    const size_t data =
-        (POSITION_BYTES + NORMAL_BYTES) * patch->vertex_count + index_bytes(mesh) * 3 * patch->triangle_count;
-    const size_t size = HEAD + 2 * CHUNK + padded(length) + padded(data);
+    size_t data = 0;
+    for (int i = 0; i < all.count; i++) data += size_of_part(&all.of[i]);
+    const size_t size = HEAD + 2 * CHUNK + padded(length) + data;
     uint8_t *bytes = text && size <= UINT32_MAX ? sqlite3_malloc64(size) : NULL;
     if (bytes) {
         uint8_t *p = bytes;
@@ -211,10 +272,7 @@ int block_glb_make(tiles *t, block_tile tile, const block_mesh *mesh, tile_bytes
         memset(p, ' ', padded(length));
         memcpy(p, text, length);
         p = put_chunk(p + padded(length), data, "BIN");
-        p = put_vertices(p, mesh, block_plan_of(t)->level[tile.level].step);
-        for (size_t i = 0; i < 3 * patch->triangle_count; i++)
-            p = index_bytes(mesh) == 2 ? put_u16(p, patch->triangles[i]) : put_u32(p, patch->triangles[i]);
-        memset(p, 0, (size_t)(bytes + size - p));
+        for (int i = 0; i < all.count; i++) p = put_part(p, &all.of[i], block_plan_of(t)->level[tile.level].step);
         *out = (tile_bytes){bytes, size};
     }
     cJSON_free(text);

@@ -17,7 +17,6 @@
 
 #define BEYOND_POLE (90 * (1 + 1e-9)) /* a row at a pole, by a rounding */
 enum { NORMAL_UNITS = 127 };
-enum { CORNER = 16 }; /* of a side, one part */
 
 /* ---------------------------------------------------------------------------------------------------- mesh -- */
 
@@ -40,16 +39,15 @@ static int make_rule(const tiles *t, block_tile tile, rqt_rule **rule) {
     return status == RQT_OK ? SQLITE_OK : SQLITE_NOMEM;
 }
 
-/* What to ask for the mesh of the north-western corner of a cell, its side so large a part of the cell's. Released
- * by end_query, whatever came of it. */
+/* What to ask for the mesh of a cell. Released by end_query, whatever came of it. */
 typedef struct cell_query {
     rqt_region *region;
     store_query_options options;
 } cell_query;
 
-static int begin_query(const tiles *t, block_tile tile, int32_t part, cell_query *q) {
+static int begin_query(const tiles *t, block_tile tile, cell_query *q) {
     const int32_t side = 1 << (t->terrain->lattice.K - tile.level);
-    const rqt_square square = {tile.i * side, tile.j * side, side / part};
+    const rqt_square square = {tile.i * side, tile.j * side, side};
     const bool is_last = tile.level == block_plan_of(t)->finest;
     *q = (cell_query){.options = {.select = RQT_SELECT_THRESHOLD,
                                   .outline = is_last ? RQT_OUTLINE_EXACT : RQT_OUTLINE_TOL,
@@ -69,7 +67,7 @@ static void end_query(cell_query *q) {
 
 static int query(tiles *t, block_tile tile, rqt_patch *patch, char **error) {
     cell_query q;
-    int code = begin_query(t, tile, 1, &q);
+    int code = begin_query(t, tile, &q);
     if (code == SQLITE_OK)
         code = store_query(t->store, t->terrain, q.region, block_plan_of(t)->level[tile.level].error, &q.options,
                            patch, NULL, error);
@@ -77,36 +75,16 @@ static int query(tiles *t, block_tile tile, rqt_patch *patch, char **error) {
     return code;
 }
 
-/* A block is walked whole before it is asked whether that is enough: a corner takes less, and most have one. */
-static int probe(tiles *t, block_tile tile, bool *has, char **error) {
-    int code = SQLITE_OK;
-    for (int32_t part = CORNER; part > 0 && code == SQLITE_OK && !*has; part = part > 1 ? 1 : 0) {
-        cell_query q;
-        if (part > 1 << (t->terrain->lattice.K - tile.level)) continue;
-        code = begin_query(t, tile, part, &q);
-        if (code == SQLITE_OK)
-            code =
-                tiles_has_triangle(t, q.region, block_plan_of(t)->level[tile.level].error, &q.options, has, error);
-        end_query(&q);
-    }
-    return code;
-}
-
 int block_has_triangle(tiles *t, block_tile tile, bool *has, char **error) {
-    const rqt_lattice *lattice = &t->terrain->lattice;
-    const int32_t side = 1 << (lattice->K - tile.level);
-    const rqt_vertex from = {tile.i * side, tile.j * side},
-                     to = rqt_vertex_clamp(lattice, (rqt_vertex){from.x + side, from.y + side});
-    const int32_t box[4] = {from.x, to.x, from.y, to.y};
-    store_cover cover = STORE_COVER_UNKNOWN;
+    const int32_t side = 1 << (t->terrain->lattice.K - tile.level), x = tile.i * side, y = tile.j * side;
+    const int32_t box[4] = {x, x + side, y, y + side};
+    rqt_block_number last = 0;
     cell_query q;
-    int code = begin_query(t, tile, 1, &q);
+    int code = begin_query(t, tile, &q);
     if (code == SQLITE_OK)
-        code = store_covers(t->store, t->terrain, box, block_plan_of(t)->level[tile.level].error, &q.options,
-                            &cover, error);
+        code = tiles_has_triangle(t, box, block_plan_of(t)->level[tile.level].error, &q.options, &last, has, error);
     end_query(&q);
-    *has = cover == STORE_COVER_ALL;
-    return code == SQLITE_OK && cover == STORE_COVER_UNKNOWN ? probe(t, tile, has, error) : code;
+    return code;
 }
 
 /* ------------------------------------------------------------------------------------------------ in space -- */

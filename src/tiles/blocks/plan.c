@@ -47,7 +47,8 @@
 #define GEOID_HIGHEST 120.0 /* EGM96 lies between -107 and 86 */
 enum { FIRST_STEP = -13, STEP_BITS = 24, FINER = 2 };
 #define STRIDES_PER_ERROR 4
-#define FREE 0.05    /* metres */
+#define FREE 0.05 /* metres */
+#define DEEPEST (EARTH_B / 2)
 #define DOUBLES 1e-7 /* metres: doubles of places in space, a dozen operations */
 
 double block_sag(const block_plan *plan, int rank) {
@@ -65,13 +66,22 @@ static void set_error(const store_terrain *t, const double em[TILES_LEVELS + FIN
     plan->level[l].centre = block_sag(plan, 2 * (t->lattice.K - l - 1) + 1);
 }
 
-/* The longest that a tile can be in space. */
+/* The longest that a tile's mesh can be in space. */
 static double size_of_tiles(const store_terrain *t, const geo_extent *e, int l) {
     const int32_t side = 1 << (t->lattice.K - l);
     const double height = fmax(fabs(e->lowest), fabs(e->highest)) + GEOID_HIGHEST;
     const double columns = fmin(side, t->lattice.width - 1), rows = fmin(side, t->lattice.height - 1);
     const double ground = (EARTH_CURVED + height) * DEGREE * hypot(columns * e->lon_step, rows * e->lat_step);
     return fmin(ground, 2 * (EARTH_CURVED + height)) + e->highest - e->lowest + 2 * GEOID_HIGHEST;
+}
+
+/* What two sides on a line differ by is no more than a level's error and what rounding moves either; the end of a
+ * wall is rounded too. Twice that: skirt.c. Levels whose triangles go through the Earth have walls that stay in it.
+ */
+static void set_step(block_level *level, double step) {
+    level->step = step;
+    level->round = step * sqrt(3) / 2 * (1 + 1e-9) + DOUBLES;
+    level->wall = fmin(2 * (level->error + 3 * level->round), DEEPEST);
 }
 
 static void set_levels(const store_terrain *t, const rqt_code largest[RQT_MAX_K + 1], block_plan *plan) {
@@ -81,11 +91,13 @@ static void set_levels(const store_terrain *t, const rqt_code largest[RQT_MAX_K 
     for (int l = 0; l <= plan->finest; l++) {
         block_level *level = &plan->level[l];
         set_error(t, em, l, plan);
-        level->step = ldexp(1, FIRST_STEP);
-        /* Half of it to either side, and the origin may be off the middle by half a metre or a step. */
-        while ((size_of_tiles(t, &e, l) / 2 + 2 + 2 * level->step) / level->step >= ldexp(1, STEP_BITS))
-            level->step *= 2;
-        level->round = level->step * sqrt(3) / 2 * (1 + 1e-9) + DOUBLES;
+        const double size = size_of_tiles(t, &e, l);
+        double step = ldexp(1, FIRST_STEP);
+        set_step(level, step);
+        /* Half of it to either side; the origin may be off the middle by half a metre or a step; walls hang down
+         * from there, and lean out by as much at most. */
+        while ((size / 2 + 2 + 2 * step + (l > 0 ? 1.5 * plan->level[1].wall : 0)) / step >= ldexp(1, STEP_BITS))
+            set_step(level, step *= 2);
     }
 }
 

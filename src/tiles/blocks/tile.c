@@ -15,8 +15,8 @@
  * its corners, and bulges towards the pole, by what curvature takes: never more than `swell`, for a place of it is
  * within that of the same place on the mesh that is straight in longitude, latitude and height, which lies in the
  * box of its corners. It does not bulge to the east or west: a wedge between two meridians less than half a turn
- * apart is convex; a wider one counts as the whole turn. Each of these widenings shrinks from a tile to those
- * below it.
+ * apart is convex; a wider one counts as the whole turn. A skirt hangs further down, and leans to the north or
+ * south by twice what a chord bulges, at most. Each of these widenings shrinks from a tile to those below it.
  */
 #include "blocks.h"
 #include "earth.h"
@@ -106,9 +106,9 @@ void block_region(const tiles *t, block_tile tile, const store_relief *relief, d
     const double swell = fmin(level->centre, level->error), moved = swell + level->round;
     double low = 0, high = 0;
     if (plan->geoid.most > 0) find_geoid(plan, box, &low, &high);
-    const double bulge = (moved < FAR ? moved / NARROW : M_PI) / DEGREE;
+    const double bulge = (2 * moved < FAR ? 2 * moved / NARROW : M_PI) / DEGREE;
     const bool is_wide = box[2] - box[0] > 180;
     block_rectangle(is_wide ? -180 : box[0], box[1] - bulge, is_wide ? 180 : box[2], box[3] + bulge, region);
-    region[4] = relief->lowest + low - moved;
+    region[4] = relief->lowest + low - moved - block_skirt_depth(t, tile);
     region[5] = relief->highest + high + moved;
 }

@@ -89,8 +89,12 @@ static int make(tiles *t, int series, int z, int32_t x, int32_t y, tile_bytes *o
     if (!block_exists(t, tile)) return SQLITE_OK;
     if (series == SUBTREES) return z % SUBTREE_LEVELS == 0 ? subtree_make(t, tile, out, error) : SQLITE_OK;
     block_mesh mesh;
+    block_skirt skirt = {0};
     int code = block_mesh_make(t, tile, &mesh, error);
-    if (code == SQLITE_OK && mesh.patch.triangle_count > 0) code = block_glb_make(t, tile, &mesh, out, error);
+    const bool has_content = code == SQLITE_OK && mesh.patch.triangle_count > 0;
+    if (has_content) code = block_skirt_make(t, tile, &mesh, &skirt);
+    if (has_content && code == SQLITE_OK) code = block_glb_make(t, tile, &mesh, &skirt, out, error);
+    block_skirt_free(&skirt);
     block_mesh_free(t, &mesh);
     return code;
 }
@@ -114,7 +118,7 @@ static void add_schema(cJSON *tileset) {
     cJSON_AddItemToObject(properties, "error",
                           property("TILE_GEOMETRIC_ERROR",
                                    "no sample that the tile covers is further from its mesh in space: metres"));
-    cJSON *region = property("TILE_BOUNDING_REGION", "where samples and mesh of the tile are");
+    cJSON *region = property("TILE_BOUNDING_REGION", "where samples, mesh and skirt of the tile are");
     cJSON_AddTrueToObject(region, "array");
     cJSON_AddNumberToObject(region, "count", 6);
     cJSON_AddItemToObject(properties, "region", region);
@@ -156,10 +160,10 @@ static void add_root(const tiles *t, const double region[6], double error, cJSON
     cJSON_AddStringToObject(cJSON_AddObjectToObject(tiling, "subtrees"), "uri", "subtrees/{level}/{x}/{y}.subtree");
 }
 
-/* For people: what the levels are off, and in which steps their vertices are placed. */
+/* For people: what the levels are off, in which steps their vertices are placed, and how far walls hang down. */
 static void add_extras(const tiles *t, cJSON *tileset) {
     const block_plan *plan = block_plan_of(t);
-    double errors[TILES_LEVELS], steps[TILES_LEVELS];
+    double errors[TILES_LEVELS], steps[TILES_LEVELS], walls[TILES_LEVELS];
     cJSON *extras = cJSON_AddObjectToObject(cJSON_AddObjectToObject(tileset, "extras"), "rqt");
     char *source = tiles_attribution(t->terrain);
     cJSON_AddStringToObject(extras, "terrain", t->terrain->name);
@@ -168,9 +172,11 @@ static void add_extras(const tiles *t, cJSON *tileset) {
     for (int l = 0; l <= plan->finest; l++) {
         errors[l] = plan->level[l].error + plan->level[l].round;
         steps[l] = plan->level[l].step;
+        walls[l] = plan->level[l].wall;
     }
     cJSON_AddItemToObject(extras, "errors", cJSON_CreateDoubleArray(errors, plan->finest + 1));
     cJSON_AddItemToObject(extras, "steps", cJSON_CreateDoubleArray(steps, plan->finest + 1));
+    cJSON_AddItemToObject(extras, "skirts", cJSON_CreateDoubleArray(walls, plan->finest + 1));
 }
 
 /* Its addresses are relative: clients take them as such. Levels are there all or not at all. */

@@ -1,10 +1,13 @@
 /* layer.c - which tiles there are, and what clients are told of them: layer.json.
  *
  * A tile is there iff a triangle of the level's mesh has inner points in it. Where no sample is void the mesh is
- * the raster's rectangle, so the tiles that overlap it are those. Elsewhere squares of tiles are asked: where all
- * blocks that answer have no void, or nothing else, that holds for all of their tiles (store_covers). Other squares
- * are quartered, and a tile that is left is asked by a query that stops at the first block with a triangle. So it
- * takes as many queries as there are tiles near the outlines of voids.
+ * the raster's rectangle, so the tiles that overlap it are those. Elsewhere the blocks that answer mark the tiles
+ * in which they have a triangle (store_mark), square of tiles by square, in bands from the south on. Each block of
+ * a square is read once for all of its tiles, and not at all when they are marked already or when it has no voids,
+ * or nothing else.
+ *
+ * That may take longer than who asks has time. So it stops at any block, and what is found stays in the plan: the
+ * bands that are done as ranges, the rest as marks. Who asks again goes on from there.
  *
  * The two tiles of level 0 are always there, with specks alone where they have no terrain: Cesium begins with
  * both, and draws nothing below one that it does not get. Cesium also wants to be told which tiles there are by
@@ -15,14 +18,30 @@
 #include "quantized_mesh.h"
 
 #include <cjson/cJSON.h>
-#include <math.h>
 #include <string.h>
+
+enum { SQUARE = 16 }; /* tiles a side */
 
 /* Ranges of a level, from the south on. */
 typedef struct row_list {
     range_list all;
     size_t row; /* where those that ended with the row before begin */
 } row_list;
+
+/* How far the search for the tiles of a level is: the square at hand, of the band at hand. A band is as many rows
+ * as a square is high, of the ranges that overlap the raster. */
+struct layer_search {
+    tile_range all[MOST_TURNS];
+    int count;
+    uint8_t *band[MOST_TURNS]; /* of each range, row by row from the south: which tiles are there */
+    int32_t y;                 /* first row of the band */
+    int range;
+    int32_t x;
+    int turn; /* longitudes are the same modulo 360: one after the other */
+    uint8_t marks[SQUARE * SQUARE];
+    rqt_block_number last; /* that has made its marks */
+    row_list list;         /* of the bands before */
+};
 
 /* One range with that of the row before, if that has the same columns. */
 static int add_range(row_list *list, tile_range range) {
@@ -35,122 +54,162 @@ static int add_range(row_list *list, tile_range range) {
     return tiles_add_range(&list->all, range);
 }
 
-/* Has the tile a triangle? */
-static int probe(tiles *t, int z, int32_t x, int32_t y, bool *is_there, char **error) {
-    const store_query_options options = plan_options(t, z);
-    rqt_region *region = NULL;
-    tile_place place;
-    *is_there = false;
-    if (!plan_place(t, z, x, y, &place) || place.turns == 0) return SQLITE_OK;
-    int code = plan_region(t, &place, &region);
-    if (code == SQLITE_OK)
-        code = tiles_has_triangle(t, region, plan_of(t)->level[z].eps, &options, is_there, error);
-    rqt_region_free(region);
+static int add_row(row_list *list, const uint8_t *row, const tile_range *r, int32_t y) {
+    const int32_t width = r->x1 - r->x0 + 1;
+    int code = SQLITE_OK;
+    for (int32_t i = 0, end; i < width && code == SQLITE_OK; i = end) {
+        for (end = i + 1; end < width && row[end] == row[i];) end++;
+        if (row[i]) code = add_range(list, (tile_range){r->x0 + i, r->x0 + end - 1, y, y});
+    }
     return code;
 }
 
-/* How much of the tiles has triangles: all, nothing, or who knows. */
-static int find_cover(tiles *t, int z, const tile_range *r, store_cover *cover, char **error) {
-    const rqt_lattice *lattice = &t->terrain->lattice;
-    const store_query_options options = plan_options(t, z);
-    tile_place first, last; /* south-west, north-east */
-    *cover = STORE_COVER_UNKNOWN;
-    if (!plan_place(t, z, r->x0, r->y0, &first) || !plan_place(t, z, r->x1, r->y1, &last)) return SQLITE_OK;
-    const tile_turn *a = &first.turn[0], *b = &last.turn[0];
-    if (first.turns != 1 || last.turns != 1 || a->box[0] > b->box[0]) return SQLITE_OK; /* not of one turn */
-    const int32_t box[4] = {(int32_t)fmax(0, floor(a->cut[0])), (int32_t)fmin(lattice->width - 1, ceil(b->cut[1])),
-                            (int32_t)fmax(0, floor(b->cut[2])),
-                            (int32_t)fmin(lattice->height - 1, ceil(a->cut[3]))};
-    return store_covers(t->store, t->terrain, box, plan_of(t)->level[z].eps, &options, cover, error);
+/* ------------------------------------------------------------------------------------------------- search -- */
+
+void layer_search_free(layer_search *s) {
+    if (!s) return;
+    for (int i = 0; i < s->count; i++) sqlite3_free(s->band[i]);
+    sqlite3_free(s->list.all.items);
+    sqlite3_free(s);
 }
 
-/* Rows of tiles, as many as a square is high, from x0, y0 on. */
-enum { SQUARE = 16 };
-typedef struct band {
-    int32_t x0, y0;
-    size_t width;
-    bool *is_there;
-} band;
+static void begin_square(layer_search *s) {
+    memset(s->marks, 0, sizeof s->marks);
+    s->last = 0;
+}
 
-static int ask_square(tiles *t, int z, const tile_range *r, band *b, char **error) {
-    store_cover cover;
-    bool is_there;
-    int code = find_cover(t, z, r, &cover, error);
+static void begin_band(const tiles *t, layer_search *s) {
+    for (int i = 0; i < s->count; i++) memset(s->band[i], 0, (size_t)(s->all[i].x1 - s->all[i].x0 + 1) * SQUARE);
+    s->range = 0;
+    s->x = s->all[0].x0;
+    s->turn = plan_turns(t).first;
+    begin_square(s);
+}
+
+static int begin_search(const tiles *t, int z, layer_search **out) {
+    layer_search *s = sqlite3_malloc(sizeof *s);
+    if (!s) return SQLITE_NOMEM;
+    *s = (layer_search){0};
+    int code = tiles_add_range(&s->list.all, (tile_range){0}); /* so that there is memory even for none */
+    s->list.all.count = 0;
+    s->count = plan_ranges(t, z, s->all);
+    for (int i = 0; i < s->count; i++) {
+        s->band[i] = sqlite3_malloc64((sqlite3_uint64)(s->all[i].x1 - s->all[i].x0 + 1) * SQUARE);
+        if (!s->band[i]) code = SQLITE_NOMEM;
+    }
+    if (code == SQLITE_OK && s->count > 0) {
+        s->y = s->all[0].y0; /* all ranges have the same rows */
+        begin_band(t, s);
+    }
+    if (code == SQLITE_OK)
+        *out = s;
+    else
+        layer_search_free(s);
+    return code;
+}
+
+/* Rows of the band at hand. */
+static int32_t rows_of(const layer_search *s) {
+    const int32_t left = s->all[0].y1 - s->y + 1;
+    return left < SQUARE ? left : SQUARE;
+}
+
+/* The tiles of the square at hand that are there, by the turn at hand. */
+static int mark_square(tiles *t, int z, layer_search *s, char **error) {
+    const store_query_options options = plan_options(t, z);
+    const tile_range *all = &s->all[s->range];
+    tile_range r = {s->x, all->x1 - s->x < SQUARE ? all->x1 : s->x + SQUARE - 1, s->y, s->y + rows_of(s) - 1};
+    int64_t x[SQUARE + 1], y[SQUARE + 1];
+    if (!plan_cells(t, z, s->turn, &r, x, y)) return SQLITE_OK;
+    rqt_cells cells = {x, y, r.x1 - r.x0 + 1, r.y1 - r.y0 + 1, s->marks};
+    const int code = store_mark(t->store, t->terrain, plan_of(t)->level[z].eps, &options, &cells, &s->last, error);
     if (code != SQLITE_OK) return code;
-    if (cover == STORE_COVER_UNKNOWN && (r->x0 < r->x1 || r->y0 < r->y1)) {
-        const int32_t x = r->x0 + (r->x1 - r->x0) / 2, y = r->y0 + (r->y1 - r->y0) / 2;
-        const tile_range quarter[4] = {
-            {r->x0, x, r->y0, y}, {x + 1, r->x1, r->y0, y}, {r->x0, x, y + 1, r->y1}, {x + 1, r->x1, y + 1, r->y1}};
-        for (int i = 0; i < 4 && code == SQLITE_OK; i++)
-            if (quarter[i].x0 <= quarter[i].x1 && quarter[i].y0 <= quarter[i].y1)
-                code = ask_square(t, z, &quarter[i], b, error);
+    const size_t width = (size_t)(all->x1 - all->x0 + 1);
+    for (int32_t j = 0; j < cells.rows; j++) /* from the north on */
+        for (int32_t i = 0; i < cells.columns; i++)
+            s->band[s->range][(size_t)(r.y1 - j - s->y) * width + (size_t)(r.x0 - all->x0 + i)] |=
+                s->marks[j * cells.columns + i];
+    return SQLITE_OK;
+}
+
+/* To the next turn, or the next square; false: it was the last one of the band. */
+static bool step(const tiles *t, layer_search *s) {
+    const turn_range on = plan_turns(t);
+    begin_square(s);
+    if (s->turn++ < on.last) return true;
+    s->turn = on.first;
+    if (s->x + SQUARE <= s->all[s->range].x1) {
+        s->x += SQUARE;
+        return true;
+    }
+    if (++s->range == s->count) return false;
+    s->x = s->all[s->range].x0;
+    return true;
+}
+
+/* The ranges of the band. */
+static int end_band(const tiles *t, layer_search *s) {
+    const int32_t rows = rows_of(s);
+    int code = SQLITE_OK;
+    for (int32_t j = 0; j < rows && code == SQLITE_OK; j++) {
+        row_list *list = &s->list;
+        const size_t before = list->all.count;
+        for (int i = 0; i < s->count && code == SQLITE_OK; i++) {
+            const size_t width = (size_t)(s->all[i].x1 - s->all[i].x0 + 1);
+            code = add_row(list, s->band[i] + (size_t)j * width, &s->all[i], s->y + j);
+        }
+        while (list->row < before && list->all.items[list->row].y1 < s->y + j) list->row++;
+    }
+    s->y += rows;
+    if (code == SQLITE_OK && s->y <= s->all[0].y1) begin_band(t, s);
+    return code;
+}
+
+static int search(tiles *t, int z, layer_search *s, char **error) {
+    int code = SQLITE_OK;
+    while (code == SQLITE_OK && s->count > 0 && s->y <= s->all[0].y1) {
+        code = mark_square(t, z, s, error);
+        if (code == SQLITE_OK && !step(t, s)) code = end_band(t, s);
+    }
+    return code;
+}
+
+/* The tiles of a level of which nothing is known yet. */
+static int find_tiles(tiles *t, int z, range_list *list, char **error) {
+    layer_search **s = &plan_of(t)->search[z];
+    int code = *s ? SQLITE_OK : begin_search(t, z, s);
+    if (code != SQLITE_OK) return code;
+    if (z == 0) {
+        code = add_range(&(*s)->list, (tile_range){0, 1, 0, 0});
+    } else if (t->terrain->voids == 0) {
+        for (int i = 0; i < (*s)->count && code == SQLITE_OK; i++) code = add_range(&(*s)->list, (*s)->all[i]);
+    } else {
+        code = search(t, z, *s, error);
+    }
+    if ((code & 0xFF) == SQLITE_INTERRUPT) {
+        t->goes_on = true;
         return code;
     }
-    is_there = cover == STORE_COVER_ALL;
-    if (cover == STORE_COVER_UNKNOWN) code = probe(t, z, r->x0, r->y0, &is_there, error);
-    for (int32_t y = r->y0; y <= r->y1; y++)
-        for (int32_t x = r->x0; x <= r->x1; x++)
-            b->is_there[(size_t)(y - b->y0) * b->width + (size_t)(x - b->x0)] = is_there;
-    return code;
-}
-
-static int add_row(const band *b, int32_t y, row_list *list) {
-    const bool *row = b->is_there + (size_t)(y - b->y0) * b->width;
-    int code = SQLITE_OK;
-    for (size_t i = 0, end; i < b->width && code == SQLITE_OK; i = end) {
-        for (end = i + 1; end < b->width && row[end] == row[i];) end++;
-        if (row[i]) code = add_range(list, (tile_range){b->x0 + (int32_t)i, b->x0 + (int32_t)end - 1, y, y});
+    if (code == SQLITE_OK) {
+        *list = (*s)->list.all;
+        (*s)->list.all = (range_list){0};
     }
-    return code;
-}
-
-/* The tiles of rows that are there, of the ranges that overlap the raster. */
-static int add_band(tiles *t, int z, const tile_range *all, int n, int32_t y0, int32_t y1, row_list *list,
-                    char **error) {
-    band bands[MOST_TURNS] = {{0}};
-    int code = SQLITE_OK;
-    for (int i = 0; i < n && code == SQLITE_OK; i++) {
-        const tile_range *r = &all[i];
-        bands[i] = (band){r->x0, y0, (size_t)(r->x1 - r->x0) + 1, NULL};
-        bands[i].is_there = sqlite3_malloc64(bands[i].width * SQUARE);
-        if (!bands[i].is_there) code = SQLITE_NOMEM;
-        for (int32_t x = r->x0; x <= r->x1 && code == SQLITE_OK; x += SQUARE) {
-            const tile_range square = {x, r->x1 - x < SQUARE ? r->x1 : x + SQUARE - 1, y0, y1};
-            code = ask_square(t, z, &square, &bands[i], error);
-        }
-    }
-    for (int32_t y = y0; y <= y1 && code == SQLITE_OK; y++) {
-        const size_t before = list->all.count;
-        for (int i = 0; i < n && code == SQLITE_OK; i++) code = add_row(&bands[i], y, list);
-        while (list->row < before && list->all.items[list->row].y1 < y) list->row++;
-    }
-    for (int i = 0; i < n; i++) sqlite3_free(bands[i].is_there);
+    layer_search_free(*s);
+    *s = NULL;
     return code;
 }
 
 int layer_available(tiles *t, int z, const tile_range **ranges, size_t *count, char **error) {
-    tile_plan *plan = t->plan;
-    tile_range all[MOST_TURNS];
-    row_list list = {0};
+    tile_plan *plan = plan_of(t);
     *ranges = NULL;
     *count = 0;
     if (z < 0 || z > plan->finest) return SQLITE_OK;
-    int code = SQLITE_OK;
     if (!plan->ranges[z]) {
-        const int n = z > 0 ? plan_ranges(t, z, all) : 0;
-        code = tiles_add_range(&list.all, (tile_range){0}); /* so that there is memory even for none */
-        list.all.count = 0;
-        for (int i = 0; i < n && t->terrain->voids == 0 && code == SQLITE_OK; i++) code = add_range(&list, all[i]);
-        const int32_t y1 = n ? all[0].y1 : -1; /* all ranges have the same rows */
-        for (int32_t y = n ? all[0].y0 : 0; y <= y1 && t->terrain->voids && code == SQLITE_OK; y += SQUARE)
-            code = add_band(t, z, all, n, y, y1 - y < SQUARE ? y1 : y + SQUARE - 1, &list, error);
-        if (z == 0 && code == SQLITE_OK) code = add_range(&list, (tile_range){0, 1, 0, 0});
-        if (code != SQLITE_OK) {
-            sqlite3_free(list.all.items);
-            return code;
-        }
-        plan->ranges[z] = list.all.items;
-        plan->range_count[z] = list.all.count;
+        range_list list = {0};
+        const int code = find_tiles(t, z, &list, error);
+        if (code != SQLITE_OK) return code;
+        plan->ranges[z] = list.items;
+        plan->range_count[z] = list.count;
     }
     *ranges = plan->ranges[z];
     *count = plan->range_count[z];

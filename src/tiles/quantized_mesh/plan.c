@@ -107,25 +107,27 @@ static int set_levels(const store_terrain *t, tile_plan *plan, char **error) {
 static int keep_ground(tiles *t, char **error) {
     tile_plan *plan = plan_of(t);
     const double cell = fmax(t->terrain->placement.dx, -t->terrain->placement.dy) * DEGREE * EARTH_A;
-    const rqt_placement as_it_is = {0, 0, 1, 1};
+    const int32_t all[4] = {0, t->terrain->lattice.width - 1, 0, t->terrain->lattice.height - 1};
     const store_query_options options = plan_options(t, 0);
-    rqt_region *all = NULL;
     bool is_there = false;
-    double most = plan->level[0].eps;
-    if (t->terrain->voids == 0) return SQLITE_OK;
-    if (rqt_region_create(NULL, &as_it_is, &t->terrain->lattice, store_allocator(), &all) != RQT_OK)
-        return SQLITE_NOMEM;
-    int code = tiles_has_triangle(t, all, most, &options, &is_there, error);
-    while (code == SQLITE_OK && !is_there && most > cell / 2) { /* finer outlines have no more */
-        most /= 2;
-        code = tiles_has_triangle(t, all, most, &options, &is_there, error);
+    if (t->terrain->voids == 0 || plan->ground.is_known) return SQLITE_OK;
+    if (plan->ground.eps == 0) plan->ground.eps = plan->level[0].eps;
+    for (;;) {
+        const int code =
+            tiles_has_triangle(t, all, plan->ground.eps, &options, &plan->ground.last, &is_there, error);
+        if (code != SQLITE_OK) return code;
+        if (is_there || plan->ground.eps <= cell / 2) break; /* finer outlines have no more */
+        plan->ground.eps /= 2;
+        plan->ground.last = 0;
     }
-    for (int z = 0; z <= plan->finest && is_there; z++) plan->level[z].eps = fmin(plan->level[z].eps, most);
-    rqt_region_free(all);
-    return code;
+    for (int z = 0; z <= plan->finest && is_there; z++)
+        plan->level[z].eps = fmin(plan->level[z].eps, plan->ground.eps);
+    plan->ground.is_known = true;
+    return SQLITE_OK;
 }
 
-int plan_create(tiles *t, void **out, char **error) {
+/* What takes no time. */
+static int begin_plan(tiles *t, tile_plan **out, char **error) {
     const store_terrain *terrain = t->terrain;
     bool is_above_geoid;
     int code = tiles_check_place(terrain, error);
@@ -140,15 +142,27 @@ int plan_create(tiles *t, void **out, char **error) {
     if (code == SQLITE_OK) {
         set_heights(terrain, plan);
         code = set_levels(terrain, plan, error);
-        if (code == SQLITE_OK) code = keep_ground(t, error);
     }
-    if (code == SQLITE_OK) code = seam_close(t, error);
     if (code == SQLITE_OK) code = water_read(t, plan, error);
     t->plan = NULL;
     if (code != SQLITE_OK)
         plan_free(plan);
     else
         *out = plan;
+    return code;
+}
+
+int plan_create(tiles *t, void **out, char **error) {
+    tile_plan *plan = *out;
+    int code = plan ? SQLITE_OK : begin_plan(t, &plan, error);
+    if (code != SQLITE_OK) return code;
+    t->plan = *out = plan;
+    code = keep_ground(t, error);
+    if (code == SQLITE_OK) code = seam_close(t, error);
+    t->plan = NULL;
+    if (code == SQLITE_OK || (code & 0xFF) == SQLITE_INTERRUPT) return code;
+    plan_free(plan);
+    *out = NULL;
     return code;
 }
 
@@ -162,6 +176,7 @@ void plan_free(void *made) {
     for (int z = 0; z < TILES_LEVELS; z++) {
         rqt_rule_free(plan->level[z].rule);
         sqlite3_free(plan->ranges[z]);
+        layer_search_free(plan->search[z]);
     }
     sqlite3_free(plan);
 }
@@ -210,20 +225,17 @@ static void place_rows(const tiles *t, double side, int32_t y, tile_turn *out) {
     for (int i = 2; i < 4; i++) out->cut[i] = ldexp((double)out->box[i], -UNIT_BITS);
 }
 
-/* The turns on which the globe's 360 degrees may meet the raster. */
-static void find_turns(const tiles *t, int *first, int *last) {
+turn_range plan_turns(const tiles *t) {
     const geo_extent e = tiles_extent(t->terrain);
-    *first = (int)floor((e.west - 180) / 360);
-    *last = (int)ceil((e.east + 180) / 360);
+    return (turn_range){(int)floor((e.west - 180) / 360), (int)ceil((e.east + 180) / 360)};
 }
 
 bool plan_place(const tiles *t, int z, int32_t x, int32_t y, tile_place *place) {
     if (z < 0 || z > plan_of(t)->finest || x < 0 || y < 0 || x >= 2 << z || y >= 1 << z) return false;
     const double side = ldexp(180, -z);
-    int first, last;
+    const turn_range on = plan_turns(t);
     *place = (tile_place){.z = z, .x = x, .y = y, .west = -180 + x * side, .south = -90 + y * side, .side = side};
-    find_turns(t, &first, &last);
-    for (int turn = first; turn <= last && place->turns < MOST_TURNS; turn++) {
+    for (int turn = on.first; turn <= on.last && place->turns < MOST_TURNS; turn++) {
         tile_turn *new = &place->turn[place->turns];
         place_columns(t, side, x, turn, new);
         place_rows(t, side, y, new);
@@ -274,12 +286,12 @@ static bool range_of_rows(const tiles *t, double side, int32_t count, tile_range
 
 int plan_ranges(const tiles *t, int z, tile_range ranges[MOST_TURNS]) {
     const double side = ldexp(180, -z);
-    int first, last, count = 0;
+    const turn_range on = plan_turns(t);
+    int count = 0;
     tile_range next;
     if (!range_of_rows(t, side, 1 << z, &next)) return 0;
-    find_turns(t, &first, &last);
     /* A later turn lies further west on the globe. */
-    for (int turn = last; turn >= first && count < MOST_TURNS; turn--) {
+    for (int turn = on.last; turn >= on.first && count < MOST_TURNS; turn--) {
         if (!range_of_columns(t, side, turn, 2 << z, &next)) continue;
         if (count > 0 && next.x0 <= ranges[count - 1].x1 + 1) {
             if (next.x1 > ranges[count - 1].x1) ranges[count - 1].x1 = next.x1;
@@ -288,6 +300,33 @@ int plan_ranges(const tiles *t, int z, tile_range ranges[MOST_TURNS]) {
         ranges[count++] = next;
     }
     return count;
+}
+
+static int64_t cut_at(int64_t at, int32_t count) {
+    const int64_t last = (int64_t)(count - 1) << UNIT_BITS;
+    return at < 0 ? 0 : at > last ? last : at;
+}
+
+bool plan_cells(const tiles *t, int z, int turn, tile_range *range, int64_t *x, int64_t *y) {
+    const rqt_lattice *lattice = &t->terrain->lattice;
+    const double side = ldexp(180, -z);
+    tile_range there;
+    tile_turn at;
+    if (!range_of_columns(t, side, turn, 2 << z, &there)) return false;
+    if (there.x0 > range->x0) range->x0 = there.x0;
+    if (there.x1 < range->x1) range->x1 = there.x1;
+    if (range->x0 > range->x1) return false;
+    for (int32_t i = range->x0; i <= range->x1; i++, x++) {
+        place_columns(t, side, i, turn, &at);
+        x[0] = cut_at(at.box[0], lattice->width);
+        x[1] = cut_at(at.box[1], lattice->width);
+    }
+    for (int32_t j = range->y1; j >= range->y0; j--, y++) {
+        place_rows(t, side, j, &at);
+        y[0] = cut_at(at.box[2], lattice->height);
+        y[1] = cut_at(at.box[3], lattice->height);
+    }
+    return true;
 }
 
 int plan_region(const tiles *t, const tile_place *place, rqt_region **region) {

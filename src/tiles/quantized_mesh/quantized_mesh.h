@@ -24,6 +24,14 @@ typedef struct tile_level {
     rqt_rule *rule;         /* NULL: the plan's */
 } tile_level;
 
+typedef struct layer_search layer_search;
+/* What is known of the largest eps that leaves a triangle (plan.c). */
+typedef struct tile_ground {
+    double eps;            /* the one that is asked for; 0: none yet */
+    rqt_block_number last; /* of store_mark */
+    bool is_known;
+} tile_ground;
+
 typedef struct sea_run {
     int32_t row, first, last;
 } sea_run;
@@ -32,6 +40,7 @@ typedef struct sea_run {
 typedef struct tile_plan {
     int finest;
     tile_level level[TILES_LEVELS];
+    tile_ground ground;
     double lowest, step; /* a height n is lowest + n * step metres, 0 <= n <= TILE_UNITS; step a power of two */
     double radius;       /* no radius of curvature, and height above it, is larger: metres */
     double rounded;      /* the terrain's quantum_error */
@@ -46,6 +55,7 @@ typedef struct tile_plan {
     size_t sea_count;
     tile_range *ranges[TILES_LEVELS]; /* NULL: not yet asked for */
     size_t range_count[TILES_LEVELS];
+    layer_search *search[TILES_LEVELS]; /* NULL: not begun, or at its end */
 } tile_plan;
 
 static inline tile_plan *plan_of(const tiles *t) {
@@ -72,6 +82,14 @@ typedef struct tile_place {
 bool plan_place(const tiles *t, int z, int32_t x, int32_t y, tile_place *place);
 /* The tiles of a level that meet the raster, as ranges that do not meet each other, at most MOST_TURNS. */
 int plan_ranges(const tiles *t, int z, tile_range ranges[MOST_TURNS]);
+/* The turns on which the globe's 360 degrees may meet the raster. */
+typedef struct turn_range {
+    int first, last;
+} turn_range;
+turn_range plan_turns(const tiles *t);
+/* Tiles of a range of plan_ranges that meet the raster on a turn, and the lines between them, cut at its end: in
+ * 2^-20 samples, x from the west, y from the north on, one more than there are tiles. False: there are none. */
+bool plan_cells(const tiles *t, int z, int turn, tile_range *range, int64_t *x, int64_t *y);
 /* The place's rectangle as a region. */
 int plan_region(const tiles *t, const tile_place *place, rqt_region **region);
 /* The options of every query of a level. */
@@ -81,7 +99,7 @@ int plan_rule(const tiles *t, rqt_rule **rule, char **error);
 
 /* Are the terrain's first and last columns one? Fills the plan's seam and merging. */
 int seam_read(tiles *t, char **error);
-/* If so: gives levels rules of their own. */
+/* If so: gives levels rules of their own, those that have none yet. */
 int seam_close(tiles *t, char **error);
 /* ... gives vertices of the last column the heights of the first; by how much samples of either may be off by that:
  * metres. */
@@ -129,10 +147,12 @@ int water_read(tiles *t, tile_plan *plan, char **error);
 /* Pixels from the north-west on; how many of them there are: 1 where all are the same. */
 size_t water_mask(const tiles *t, const tile_place *place, uint8_t mask[WATER_SIDE * WATER_SIDE]);
 
+/* Interrupted, it goes on from there when it is called again. */
 int layer_available(tiles *t, int z, const tile_range **ranges, size_t *count, char **error);
 /* The tiles below one of level 0, as JSON: a list of ranges for each level from 1 on, to be released with
  * sqlite3_free. */
 int layer_below(tiles *t, int32_t x, char **text, char **error);
+void layer_search_free(layer_search *search); /* NULL is passed over */
 int layer_make(tiles *t, int first, int last, tile_bytes *out, char **error);
 
 int encode_tile(tiles *t, const tile_place *place, const tile_mesh *mesh, tile_bytes *out, char **error);

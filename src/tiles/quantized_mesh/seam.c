@@ -119,8 +119,14 @@ int seam_close(tiles *t, char **error) {
     uint8_t *on = sqlite3_malloc64(4 * (sqlite3_uint64)t->terrain->lattice.height);
     int code = on ? make_rims(t->terrain, &rims) : SQLITE_NOMEM;
     for (int z = 0; z <= plan->finest && code == SQLITE_OK; z++) {
-        code = plan_rule(t, &plan->level[z].rule, error);
-        if (code == SQLITE_OK) code = close_level(t, rims, plan->level[z].eps, plan->level[z].rule, on, error);
+        rqt_rule *rule = NULL;
+        if (plan->level[z].rule) continue;
+        code = plan_rule(t, &rule, error);
+        if (code == SQLITE_OK) code = close_level(t, rims, plan->level[z].eps, rule, on, error);
+        if (code == SQLITE_OK)
+            plan->level[z].rule = rule;
+        else
+            rqt_rule_free(rule);
     }
     rqt_region_free(rims);
     sqlite3_free(on);
