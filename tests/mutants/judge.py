@@ -1,6 +1,6 @@
 """Mutants of what the judge of tiles found, and of what it alone looks at: see ../mutants.py."""
 
-JUDGE = "test_verify_tiles.py"
+JUDGE, KINDS = "test_verify_tiles.py", "test_verify_tiles_kinds.py"
 SEAM, PLAN, GLOBE, MESH = "src/tiles/seam.c", *("src/tiles/quantized_mesh/%s.c" % name for name in ("plan", "globe", "mesh"))
 TILES, ENDPOINTS = "src/tiles/tiles.c", "src/serve/endpoints.c"
 
@@ -15,4 +15,7 @@ MUTANTS = [
     ("judge: the horizon point is exact, and then rounded", GLOBE, "most * (1 + 1e-7)", "most * (1 - 1e-6)", JUDGE, "the judge finds nothing"),
     ("judge: the mesh is a little too coarse", MESH, "region, plan_of(t)->level[place->z].eps", "region, 1.1 * plan_of(t)->level[place->z].eps", JUDGE, "the judge finds nothing"),
     ("judge: clients may not say which extensions they want", ENDPOINTS, '" extensions v ", answer_tile', '" ", answer_tile', JUDGE, "the service has what is listed"),
+    ("judge: a tile of 3D Tiles states less than it is off", "src/tiles/blocks/tile.c", "return fmin(level->error, own)", "return 0.9 * fmin(level->error, own)", KINDS, "3d-tiles: the judge finds nothing"),
+    ("judge: the root's region has a row more", "src/tiles/blocks/tileset.c", "block_rectangle(at->x0, at->y0 + side * at->dy,", "block_rectangle(at->x0, at->y0 + (side + 1) * at->dy,", KINDS, "3d-tiles: the judge finds nothing"),
+    ("judge: pixels are rounded to a side", "src/tiles/terrarium/pixels.c", "(metres - LOWEST) * g->per_step + 0.5, most", "(metres - LOWEST) * g->per_step + 0.25, most", KINDS, "terrarium: the judge finds nothing"),
 ]
