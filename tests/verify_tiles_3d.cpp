@@ -21,7 +21,8 @@
  *     skirt     what hangs from the sides that neighbours have, as a second surface: upper ends are the ground's
  *               own vertices and normals, lower ones no further down than the content says, and at least twice
  *               what the tile states, in the region
- *     normals   within a degree of the raster's central differences in space
+ *     normals   on the last level within a degree of the raster's central differences in space; on the others, of
+ *               the mean of the triangles around the vertex by their areas: inside of cells by the tile alone
  *     regions   vertices, the middles of triangles and of their sides, and regions of children lie in them; the
  *               root's, divided again and again, has the vertices of each tile
  *     errors    do not grow from a tile to its children; clients without metadata reckon with no less; a content
@@ -123,7 +124,7 @@ class Judge {
     std::vector<Spot> find_samples(Place p, const Cell &cell, const Surface &s, double step);
     void judge_samples(Place p, const Cell &cell, const Surface &s, const std::vector<Spot> &spots, double error);
     void judge_poles(Place p, const Cell &cell, const Tree &tree, double error);
-    void judge_normals(Place p, const Surface &s, const std::vector<Spot> &spots);
+    void judge_normals(Place p, const Cell &cell, const Surface &s, const std::vector<Spot> &spots);
     void judge_region(Place p, const Surface &s, const std::vector<Spot> &spots, const Region &region, double step);
     void judge_skirt(Place p, const ImplicitTile &info, const Cell &cell, const Gltf &gltf,
                      const std::vector<Spot> &spots);
@@ -345,12 +346,21 @@ void Judge::judge_cover(int l) {
     for (const uint8_t is_covered : cover) figures.samples += is_covered;
 }
 
-void Judge::judge_normals(Place p, const Surface &s, const std::vector<Spot> &spots) {
-    Promise &normals = verdict.of("normals: they are the terrain's at full resolution");
+void Judge::judge_normals(Place p, const Cell &cell, const Surface &s, const std::vector<Spot> &spots) {
+    Promise &normals = verdict.of("normals: they are the terrain's at full resolution, or of the triangles around");
     normals.unit = " degrees";
+    const bool is_last = p.level == set.levels - 1;
+    std::vector<Vec> stars(spots.size());
+    for (size_t i = 0; i < s.triangles.size(); i += 3) {
+        const uint32_t *corner = &s.triangles[i];
+        const Vec a = s.places[corner[0]], b = s.places[corner[1]], c = s.places[corner[2]];
+        for (int k = 0; k < 3; k++) stars[corner[k]] = stars[corner[k]] + cross(b - a, c - a);
+    }
     for (size_t i = 0; i < spots.size(); i++) {
-        Vec n;
-        if (spots[i].at_pole || !raster.normal(spots[i].col, spots[i].row, n)) continue;
+        Vec n = stars[i];
+        bool is_inside = true;
+        for (int k = 0; k < SIDES; k++) is_inside = is_inside && !is_on_side(spots[i], cell, k);
+        if (spots[i].at_pole || !(is_last ? raster.normal(spots[i].col, spots[i].row, n) : is_inside)) continue;
         const double angle = std::atan2(length(cross(n, s.normals[i])), dot(n, s.normals[i])) / RADIAN;
         figures.normal = std::max(figures.normal, angle);
         verdict.see(normals, angle < 1, [&] {
@@ -560,7 +570,7 @@ void Judge::judge_tile(Place p, const ImplicitTile &info) {
     const std::vector<Spot> spots = find_samples(p, cell, s, gltf.step);
     if (spots.empty()) return;
     judge_samples(p, cell, s, spots, info.error);
-    judge_normals(p, s, spots);
+    judge_normals(p, cell, s, spots);
     judge_region(p, s, spots, info.region, gltf.step);
     summarise(p, cell, s, spots);
     if (has_skirt) judge_skirt(p, info, cell, gltf, spots);
