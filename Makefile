@@ -142,9 +142,12 @@ $(BUILD)/tests/test_%.o: tests/test_%.c $(GENERATED)
 $(BUILD)/tests/test_%: $(BUILD)/tests/test_%.o $(BUILD)/tests/libtest.a
 	@$(CXX) $(SANITIZE) $(LINK_TEST) -o $@ $^ $(LIBS_TEST)
 # The judge of tiles is linked to nothing of ours.
-$(BUILD)/tests/verify_tiles: tests/verify_tiles.cpp $(wildcard tests/verify_tiles_*.h)
+JUDGE_OF_TILES = $(patsubst %.cpp,$(BUILD)/%.o,$(wildcard tests/verify_tiles*.cpp))
+$(JUDGE_OF_TILES): $(BUILD)/%.o: %.cpp
 	@mkdir -p $(@D)
-	@echo "  compile $<"; $(CXX) $(filter-out -MMD -MP,$(CXXFLAGS)) $(GDAL_CFLAGS) -o $@ $< $(shell gdal-config --libs 2>/dev/null) -lcjson
+	@echo "  compile $<"; $(CXX) $(CXXFLAGS) $(GDAL_CFLAGS) -c $< -o $@
+$(BUILD)/tests/verify_tiles: $(JUDGE_OF_TILES)
+	@$(CXX) $(SANITIZE) -o $@ $^ $(shell gdal-config --libs 2>/dev/null) -lGeographicLib -lcjson
 # The C decoder's answers, beside which the page's are put.
 $(BUILD)/tests/web/decode: tests/web/decode.c $(BUILD)/librqt.a
 	@mkdir -p $(@D)
@@ -257,7 +260,7 @@ verify-views: ## rqt_view_verify over 200 cameras on every DEM of DATA=dir, and 
 	@RQT=$(BUILD)/rqt RQT_SO=$(BUILD)/rqt.so /usr/bin/python3 tests/bench/verify_views.py $(DATA)
 
 .PHONY: verify-tiles
-verify-tiles: ## every tile of every level of every DEM of DATA=dir, decoded, beside the raster at every sample; the service too: tables
+verify-tiles: ## every tile of every level of every DEM of DATA=dir (KIND=3d-tiles: only those), decoded, beside the raster at every sample; the service too: tables
 	@./src/install-packages.sh build test
 	@$(MAKE) --no-print-directory -j2 products $(BUILD)/tests/verify_tiles
 	@BUILD=$(BUILD) RQT=$(BUILD)/rqt RQT_SO=$(BUILD)/rqt.so /usr/bin/python3 tests/verify_tiles.py $(DATA)

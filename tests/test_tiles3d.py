@@ -218,6 +218,8 @@ class Terrain:
         db.close()
         self.raster = raster or s.read_raster(path)
         self.height, self.width = len(self.raster), len(self.raster[0])
+        # Does it go once around the Earth? Then its last column is its first, whose heights both have.
+        self.closes = abs((self.width - 1) * self.dx - 360) < 1e-6
         self.side = 1
         while self.side < max(self.height, self.width) - 1:
             self.side *= 2
@@ -234,6 +236,9 @@ class Terrain:
         if (col, row) not in self.space:
             self.space[col, row] = ecef(self.x0 + col * self.dx, self.y0 + row * self.dy, self.raster[row][col])
         return self.space[col, row]
+
+    def vertex_place(self, col, row):
+        return ecef(self.x0, self.y0 + row * self.dy, self.raster[row][0]) if self.closes and col == self.width - 1 else self.place(col, row)
 
     def cell(self, level, x, y):
         """Columns and rows of a tile, clamped."""
@@ -257,6 +262,13 @@ class Terrain:
             if col < cell[0] and abs(col + turn - cell[1]) < 0.1:
                 col = cell[1]
             found.append((col, row))
+        if self.closes and cell[:2] == (0, self.width - 1):
+            # Both ends are in the tile, and one place: by the columns of what a vertex is joined to.
+            ends = {v for v, (col, _) in enumerate(found) if col in (0, cell[1])}
+            for triangle in tile.triangles:
+                others = [found[v][0] for v in triangle if v not in ends and found[v][0] is not None]
+                for v in ends.intersection(triangle) if others else ():
+                    found[v] = (cell[1] if sum(others) > len(others) * cell[1] / 2 else 0), found[v][1]
         return found
 
 
@@ -357,7 +369,7 @@ def check_terrain(t, is_whole):
         for v, (col, row) in enumerate(samples):
             at = cell[0] if col is None else col
             if not (cell[0] <= at <= cell[1] and cell[2] <= row <= cell[3]) or t.raster[row][at] is None or \
-                    max(abs(d) for d in minus(tile.xyz[v], t.place(at, row))) > step / 2 + 1e-6:
+                    max(abs(d) for d in minus(tile.xyz[v], t.vertex_place(at, row))) > step / 2 + 1e-6:
                 strangers.append((p, col, row))
         share, covered, vertical = measure(t, p, tile, samples, there[p][0])
         worst, level_worst[p[0]], seen = max(worst, share), max(level_worst[p[0]], share), seen + len(covered)
@@ -385,6 +397,7 @@ def check_terrain(t, is_whole):
     empty = [p for p in there if p not in tiles and p[0] == finest and exact_cover(t, t.cell(*p))[1]]
     s.equal(name + ": no tile of the last level that has such a triangle is left out", empty, [])
     check_seams(t)
+    check_stars(t)
     check_skirts(t)
     # Regions.
     s.equal(name + ": regions lie in those above", [p for p in there if p[0] > 0 and not holds(there[p[0] - 1, p[1] // 2, p[2] // 2][1], there[p][1])][:5], [])
@@ -419,6 +432,48 @@ def check_normals(t):
     s.check("%s: normals are the terrain's, from its full resolution (%d, worst %.2f degrees)" % (t.name, seen, worst), seen > 1000 and worst < 0.7, worst)
 
 
+def plus(a, b):
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+def off_by(normal, n):
+    """A normal in 127ths beside a vector of any length: the most that a number of it is off."""
+    length = math.hypot(*n)
+    return max(abs(a - 127 * b / length) for a, b in zip(normal, n))
+
+
+def check_stars(t):
+    """On the others: at each vertex the sum of the area vectors of all triangles of the level that have it, whatever tiles they are
+    of. In whole steps, which are Python's integers; of a star without area, the ellipsoid's."""
+    wrong, seen, shared, lone = [], 0, 0, 0
+    for level in range(t.set.levels - 1):
+        sums, of = {}, {}
+        tiles = {p: tile for p, tile in t.tiles.items() if p[0] == level}
+        for p, tile in tiles.items():
+            # A pole's samples are one place, so these are nobody else's; of those at a corner of the tile half the star is next to it.
+            of[p] = [(p, v) if col is None else (0 if t.closes and col == t.width - 1 else col, row) for v, (col, row) in enumerate(t.samples_of(tile, t.cell(*p)))]
+            places = [tuple(round(x / tile.told["step"]) for x in xyz) for xyz in tile.xyz]
+            for triangle in tile.triangles:
+                (ax, ay, az), (bx, by, bz), (cx, cy, cz) = (places[v] for v in triangle)
+                ux, uy, uz, vx, vy, vz = bx - ax, by - ay, bz - az, cx - ax, cy - ay, cz - az
+                n = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+                for v in triangle:
+                    sums[of[p][v]] = plus(sums.get(of[p][v], (0, 0, 0)), n)
+        for p, tile in tiles.items():
+            c0, c1, r0, r1 = t.cell(*p)
+            for v, sample in enumerate(of[p]):
+                stars = [sums[sample]]
+                if sample[0] is p:
+                    stars += [plus(stars[0], n) for key, n in sums.items() if isinstance(key[0], tuple) and key != sample]
+                lone += stars[0] == (0, 0, 0)
+                off = min(off_by(tile.normals[v], n if n != (0, 0, 0) else (tile.xyz[v][0], tile.xyz[v][1], tile.xyz[v][2] / (1 - F) ** 2)) for n in stars)
+                seen, shared = seen + 1, shared + (sample[0] in (c0, c1) or sample[1] in (r0, r1))
+                if off > 0.5 + 1e-6:
+                    wrong.append((p, sample, tile.normals[v], off))
+    s.check("%s: normals of coarser levels are the stars' (%d vertices, %d of them at sides, %d without a star)" % (t.name, seen, shared, lone),
+            seen > 0 and not wrong, (len(wrong), wrong[:3]))
+
+
 def check_seams(t):
     """What two tiles of a level share: the same places, bit by bit, and the same normals."""
     compared, different = 0, []
@@ -442,6 +497,20 @@ def check_seams(t):
                 lone = [p for p in both if sum(any(p == q for q, _ in side) for side in border) == 1]
                 different += [(level, x, y, other, p) for p in lone if not is_at_outline(t, p)]
     s.check("%s: what neighbours share is decoded to the same doubles (%d vertices)" % (t.name, compared), compared > 0 and not different, different[:5])
+
+
+def check_closed(t):
+    """Around the Earth: the first and the last column of each level have the same places, bit by bit, and the same normals."""
+    compared, different = 0, []
+    for level in range(t.set.levels):
+        ends = [set(), set()]
+        for p, tile in t.tiles.items():
+            for v, (col, _) in enumerate(t.samples_of(tile, t.cell(*p)) if p[0] == level else ()):
+                if col in (0, t.width - 1):
+                    ends[col > 0].add((tile.xyz[v], tile.normals[v]))
+        compared += len(ends[0])
+        different += [(level, len(ends[0] - ends[1]), len(ends[1] - ends[0]), sorted(ends[0] ^ ends[1])[:2])] if ends[0] != ends[1] else []
+    s.check("%s: both ends are one (%d vertices)" % (t.name, compared), t.closes and compared > 0 and not different, different)
 
 
 def frame_at(p):
@@ -583,6 +652,12 @@ PYRENEES = terrain("pyrenees", window("pyrenees", os.path.join(zipped, "N42E001.
 earth = [row[::6] for row in s.read_raster(os.path.join(s.DATA, "etopo1_1deg.tif"))[::6]]
 EARTH = terrain("F28_earth", s.write_grid(s.temp("earth.asc"), earth, -180, -90, 6, s.WGS84), raster=earth, block=3)
 
+check_closed(EARTH)
+# Rough ground that goes around, its ends a metre apart here and there, begins anywhere, and has no poles.
+around = [row + [row[0] + y % 3 - 1] for y, row in enumerate(s.rough_grid(96, 33, 17, relief=4000))]
+ROUND = terrain("F28_round", s.write_grid(s.temp("round.asc"), around, 33.5, -60, 3.75, s.WGS84), raster=around, block=4)
+check_closed(ROUND)
+
 # Voids, and an odd size.
 hole = s.rough_grid(75, 67, 7, relief=300)
 for row in range(67):
@@ -604,6 +679,9 @@ flat = [[0 if col < 40 else 3 * (col - 39) for col in range(65)] for _ in range(
 PLAIN = terrain("plain", s.write_grid(s.temp("plain.asc"), flat, 5, 43, 1 / 3600, s.WGS84), raster=flat, block=4)
 s.equal("plain: a tile of sea has two triangles, and states centimetres",
         [(len(PLAIN.tiles[2, 0, 0].triangles), PLAIN.set.there[2, 0, 0][0] < 0.1)], [(2, True)])
+# Two planes that meet where cells do: a star there knows where the triangles next to the cell end.
+bent = [[3 * max(0, col - 32) for col in range(65)] for _ in range(65)]
+terrain("bent", s.write_grid(s.temp("bent.asc"), bent, 5, 43, 1 / 3600, s.WGS84), raster=bent, block=3)
 # Heights above EGM96 are in space where GDAL has them, above the ellipsoid.
 geoid = s.temp("geoid.tif")
 s.run(["gdal_translate", "-q", "-a_srs", "EPSG:4326+5773", s.write_grid(s.temp("sea.asc"), hill, 7, 46, 1 / 64, s.WGS84), geoid])

@@ -114,28 +114,36 @@ for row in range(73):
 RASTER = s.write_grid(s.temp("lake.asc"), grid, 8.97, 46.93, 1 / 3600, s.WGS84)
 
 
+def terrain(tile):
+    return "%d/%d/%d.terrain" % tile
+
+
+def tiles_of(files):
+    return sorted(p[1:4] for p in map(v.place_of, files) if p)
+
+
 def make(name, sea):
     database, folder = s.temp(name + ".gpkg"), s.temp(name)
     s.import_terrain(database, RASTER, name="t", **({} if sea is None else {"sea": sea}))
     s.equal(name + ": rqt tiles", s.run([s.RQT, "tiles", database, "-o", folder]), ("", 0))
-    told, status = v.judge(RASTER, folder, sea)
+    told, status = v.judge("quantized-mesh", RASTER, folder, sea)
     wrong = [line for line in told.splitlines() if line.startswith("FAILED") or line.startswith("    ")]
     s.check(name + ": the judge finds nothing", status == 0 and not wrong, wrong[:4])
     # Nothing that it asks for was left out.
     s.check(name + ": ... and looked at every promise", told.count("\nok ") >= 19 and " (0 looked at" not in told, told)
-    served, missing, faults = v.judge_service(database, "t", folder)
+    served, missing, faults = v.judge_service("quantized-mesh", database, "t", folder)
     s.check(name + ": the service has what is listed, and nothing else (%d, %d)" % (served, missing), served > 10 and missing > 10 and not faults, faults[:3])
-    s.equal(name + ": compressed tiles are the same, unpacked", v.judge_compressed(database, folder), [])
+    s.equal(name + ": compressed tiles are the same, unpacked", v.judge_compressed("quantized-mesh", database, folder), [])
     return database, folder
 
 
 make("voids", None)
 DATABASE, FOLDER = make("lake", 0)
 FILES = v.read_files(FOLDER)
-TILES = v.listed(json.loads(FILES["layer.json"]))
+TILES = tiles_of(FILES)
 FINEST = max(TILES)[0]
 # A tile in the middle of the finest level that has neighbours.
-INNER = max((t for t in TILES if t[0] == FINEST and (FINEST, t[1] + 1, t[2]) in TILES), key=lambda t: len(FILES[v.path_of(t)]))
+INNER = max((t for t in TILES if t[0] == FINEST and (FINEST, t[1] + 1, t[2]) in TILES), key=lambda t: len(FILES[terrain(t)]))
 
 
 def sees(what, promise, spoil, sea=0):
@@ -143,7 +151,7 @@ def sees(what, promise, spoil, sea=0):
     copy = s.temp("copy")
     shutil.copytree(FOLDER, copy)
     spoil(copy)
-    told, status = v.judge(RASTER, copy, sea)
+    told, status = v.judge("quantized-mesh", RASTER, copy, sea)
     shutil.rmtree(copy)
     named = any(line.startswith("FAILED " + promise) for line in told.splitlines())
     s.check("spoiled: %s: the judge sees it" % what, status == 1 and named, [line for line in told.splitlines() if line.startswith("FAILED")] or told[-300:])
@@ -151,7 +159,7 @@ def sees(what, promise, spoil, sea=0):
 
 def in_tile(spoil, tile=INNER):
     def in_folder(folder):
-        path = os.path.join(folder, v.path_of(tile))
+        path = os.path.join(folder, terrain(tile))
         with open(path, "rb") as f:
             parts = Parts(f.read())
         before = bytes(parts.data)
@@ -176,11 +184,11 @@ sees("the highest is another", "header: the metadata's", in_tile(state(b"maximum
 sees("more is stated than clients take", "header: what a tile states", in_tile(state(b"error", b"99999")))
 sees("a side's list", "header: the lists of sides", in_tile(change_side))
 sees("a normal", "normals: ", in_tile(bend_normals))
-sees("a pixel of water", "water: ", in_tile(turn_water, next(t for t in reversed(TILES) if len(FILES[v.path_of(t)]) > 65536)))
+sees("a pixel of water", "water: ", in_tile(turn_water, next(t for t in reversed(TILES) if len(FILES[terrain(t)]) > 65536)))
 sees("an index", "format: ", in_tile(change_index))
 sees("half a tile", "format: ", in_tile(cut_off))
-sees("a tile is listed and not there", "listed: ", lambda folder: os.remove(os.path.join(folder, v.path_of(INNER))))
-sees("a tile is there and not listed", "listed: ", lambda folder: shutil.copy(os.path.join(folder, v.path_of(INNER)), os.path.join(folder, "0/1/7.terrain")))
+sees("a tile is listed and not there", "listed: ", lambda folder: os.remove(os.path.join(folder, terrain(INNER))))
+sees("a tile is there and not listed", "listed: ", lambda folder: shutil.copy(os.path.join(folder, terrain(INNER)), os.path.join(folder, "0/1/7.terrain")))
 
 
 def unlist(folder):
@@ -198,11 +206,11 @@ sees("... and these have ground there", "children: where no child", unlist)
 # The service and --gzip beside a folder that is not theirs.
 copy = s.temp("copy")
 shutil.copytree(FOLDER, copy)
-in_tile(turn_water, next(t for t in reversed(TILES) if len(FILES[v.path_of(t)]) > 65536))(copy)
-s.check("spoiled: a byte of a tile: the service has another", any("is served as" in f for f in v.judge_service(DATABASE, "t", copy)[2]))
-s.check("... and so has --gzip", len(v.judge_compressed(DATABASE, copy)) == 1)
-unlist(copy)
-s.check("spoiled: tiles that are not listed: the service has them", any("is not listed, and the service answers" in f for f in v.judge_service(DATABASE, "t", copy)[2]))
+in_tile(turn_water, next(t for t in reversed(TILES) if len(FILES[terrain(t)]) > 65536))(copy)
+s.check("spoiled: a byte of a tile: the service has another", any("is served as" in f for f in v.judge_service("quantized-mesh", DATABASE, "t", copy)[2]))
+s.check("... and so has --gzip", len(v.judge_compressed("quantized-mesh", DATABASE, copy)) == 1)
+os.remove(os.path.join(copy, terrain(INNER)))
+s.check("spoiled: a tile is not there: the service has it", any("is not there, and the service answers" in f for f in v.judge_service("quantized-mesh", DATABASE, "t", copy)[2]))
 
 # ------------------------------------------------------------------------------------------- the Earth, and hardly anything
 
@@ -211,8 +219,8 @@ def judged(name, raster):
     database, folder = s.temp(name + ".gpkg"), s.temp(name)
     s.import_terrain(database, raster, name="t")
     s.run([s.RQT, "tiles", database, "-o", folder])
-    told, status = v.judge(raster, folder)
-    return told, status, v.listed(json.loads(v.read_files(folder)["layer.json"]))
+    told, status = v.judge("quantized-mesh", raster, folder)
+    return told, status, tiles_of(v.read_files(folder))
 
 
 # Both columns at 180 degrees are there, and differ by a metre in some rows.
@@ -239,6 +247,6 @@ for name, grid, place, sentence in (("flat", s.rough_grid(9, 9, 1), (), "in long
     database = s.temp(name + ".gpkg")
     s.import_terrain(database, s.write_grid(s.temp(name + ".asc"), grid, *place), name="t")
     said, status = s.run([s.RQT, "tiles", database, "-o", s.temp(name)])
-    s.check("a terrain without tiles says so, and so does the service: " + sentence, status == 1 and sentence in said and v.judge_refusal(database, said) == [], said)
+    s.check("a terrain without tiles says so, and so does the service: " + sentence, status == 1 and sentence in said and v.judge_refusal("quantized-mesh", database, said) == [], said)
 
 s.finish()

@@ -1,17 +1,19 @@
 #!/usr/bin/python3
 """verify_tiles.py RASTER... - `make verify-tiles DATA=dir`: the proof of tiles over whole rasters, as Markdown tables.
 
-Each raster (tif, hgt.zip, dem, asc, or all of a directory) becomes a terrain of a temporary database, and its tiles a folder, by
-`rqt tiles`. tests/verify_tiles.cpp, which shares no code with what makes them, decodes every tile of every level and puts it beside
-the raster at every sample. Then `rqt serve` is asked for every tile that layer.json lists, and for those beside them; and compressed
-tiles are unpacked. Terrains that have no tiles (projected ones) must say so. A raster that import refuses is skipped.
+Each raster (tif, hgt.zip, dem, asc, or all of a directory) becomes a terrain of a temporary database, and its tiles of each kind a folder,
+by `rqt tiles`. tests/verify_tiles.cpp, which shares no code with what makes them, decodes every tile of every level and puts it beside
+the raster at every sample. Then `rqt serve` is asked for every file of the folder, which are all that are listed, and for tiles beside
+them; and compressed tiles are unpacked. Terrains that have no tiles (projected ones) must say so. A raster that import refuses is skipped.
 Exits with 1 when anything is not as promised.
-  SEA=0   every void is imported as sea of this height, which the water masks must have
+  KIND=3d-tiles   one kind only
+  SEA=0           every void is imported as sea of this height, which the water masks must have
 """
 import glob
 import gzip
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -22,6 +24,14 @@ import sql_support as s
 
 JUDGE = os.path.abspath(os.path.join(os.environ.get("BUILD", os.path.join(s.ROOT, "build")), "tests", "verify_tiles"))
 NO_TILES = "has no tiles: "
+# Of each kind: its document, the media type of each kind of file.
+KINDS = {"quantized-mesh": ("layer.json", {"json": "application/json", "terrain": "application/vnd.quantized-mesh"}),
+         "3d-tiles": ("tileset.json", {"json": "application/json", "glb": "model/gltf-binary", "subtree": "application/octet-stream"}),
+         "terrarium": ("tile.json", {"json": "application/json", "png": "image/png"})}
+# As CesiumJS and cesium-native ask for the first kind; browsers for the others.
+CLIENTS = {"quantized-mesh": ("?extensions=octvertexnormals-metadata&v=1.0.0",
+                              "application/vnd.quantized-mesh;extensions=octvertexnormals-metadata,application/octet-stream;q=0.9,*/*;q=0.01"),
+           "3d-tiles": ("", "*/*"), "terrarium": ("", "image/avif,image/webp,image/png,*/*;q=0.8")}
 
 
 def rasters(arguments):
@@ -33,9 +43,9 @@ def rasters(arguments):
             yield given
 
 
-def judge(raster, folder, sea=None):
+def judge(kind, raster, folder, sea=None):
     """What the judge says, and its exit status."""
-    done = subprocess.run([JUDGE, raster, folder] + ([] if sea is None else [str(sea)]), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    done = subprocess.run([JUDGE, kind, raster, folder] + ([] if sea is None else [str(sea)]), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     return done.stdout, done.returncode
 
 
@@ -51,92 +61,101 @@ def read_files(folder):
     return found
 
 
-def listed(layer):
-    """Every tile that layer.json has: z, x, y."""
-    return [(z, x, y) for z, ranges in enumerate(layer["available"]) for r in ranges
-            for y in range(r["startY"], r["endY"] + 1) for x in range(r["startX"], r["endX"] + 1)]
+def place_of(path):
+    """Series, level, column, row and ending of a tile's path."""
+    found = re.fullmatch(r"(.*?)(\d+)/(\d+)/(\d+)(\.\w+)", path)
+    return found and (found[1], int(found[2]), int(found[3]), int(found[4]), found[5])
 
 
-def path_of(tile):
-    return "%d/%d/%d.terrain" % tile
+def path_of(place):
+    return "%s%d/%d/%d%s" % place
 
 
-def judge_service(database, terrain, folder):
-    """The service has the folder's bytes, and no tile beside those that are listed. A sentence a fault."""
+def beside(places):
+    """Tiles that are around these, above the first ones and below the last ones, and are not among them."""
+    found = set()
+    for series, ending in {(p[0], p[4]) for p in places}:
+        mine = {p[1:4] for p in places if p[0] == series}
+        deepest = max(mine)[0]
+        near = {(z, x + i, y + j) for z, x, y in mine for i in (-1, 0, 1) for j in (-1, 0, 1)} | {(z, x, y) for z in range(4) for x in range(2 << z) for y in range(1 << z)}
+        near |= {(deepest + 1, 2 * x, 2 * y) for z, x, y in mine if z == deepest}
+        found |= {(series, *place, ending) for place in near - mine if min(place) >= 0}
+    return found
+
+
+def is_document(kind, mine, theirs):
+    """Terrarium's has whole addresses where it is served."""
+    mine, theirs = json.loads(mine), json.loads(theirs)
+    return {**mine, "tiles": 0} == {**theirs, "tiles": 0} if kind == "terrarium" else mine == theirs
+
+
+def judge_service(kind, database, terrain, folder):
+    """The service has the folder's bytes, and no tile beside those. A sentence a fault."""
     files, faults = read_files(folder), []
     server = service.Service(database)
-    root = "/collections/%s/tiles/quantized-mesh/" % terrain
-    answer = server.ask(root + "layer.json")
-    if answer.status != 200 or answer.body != files["layer.json"]:
-        faults.append("the service's layer.json is not the folder's")
-    tiles = set(listed(json.loads(files["layer.json"])))
-    for tile in sorted(tiles):
-        answer = server.ask(root + path_of(tile))
-        if answer.status != 200 or answer.body != files.get(path_of(tile)) or answer.content_type != "application/vnd.quantized-mesh":
-            faults.append("%s is served as %d bytes of %s, status %d" % (path_of(tile), len(answer.body), answer.content_type, answer.status))
-    # As CesiumJS and cesium-native ask for it.
-    any_tile = max(tiles)
-    answer = server.ask(root + path_of(any_tile) + "?extensions=octvertexnormals-metadata&v=1.0.0", headers={
-        "Accept": "application/vnd.quantized-mesh;extensions=octvertexnormals-metadata,application/octet-stream;q=0.9,*/*;q=0.01", "Accept-Encoding": "gzip"})
-    if answer.status != 200 or answer.content_encoding != "gzip" or gzip.decompress(answer.body) != files.get(path_of(any_tile)):
-        faults.append("%s with the extensions that clients ask for: status %d" % (path_of(any_tile), answer.status))
-    deepest = any_tile[0]
-    beside = {(z, x + i, y + j) for z, x, y in tiles for i in (-1, 0, 1) for j in (-1, 0, 1)} | {(z, x, y) for z in range(4) for x in range(2 << z) for y in range(1 << z)}
-    beside |= {(deepest + 1, 2 * x, 2 * y) for z, x, y in tiles if z == deepest}
-    for tile in sorted(t for t in beside - tiles if min(t) >= 0):
-        if server.ask(root + path_of(tile)).status != 404:
-            faults.append(path_of(tile) + " is not listed, and the service answers")
+    root = "/collections/%s/tiles/%s/" % (terrain, kind)
+    document, types = KINDS[kind]
+    for path, mine in sorted(files.items()):
+        answer = server.ask(root + path)
+        is_same = answer.status == 200 and (is_document(kind, mine, answer.body) if path == document else answer.body == mine)
+        if not is_same or answer.content_type != types.get(path.rsplit(".")[-1]):
+            faults.append("%s is served as %d bytes of %s, status %d" % (path, len(answer.body), answer.content_type, answer.status))
+    places = {place_of(path) for path in files} - {None}
+    query, accepted = CLIENTS[kind]
+    any_tile = path_of(max(places))
+    answer = server.ask(root + any_tile + query, headers={"Accept": accepted, "Accept-Encoding": "gzip"})
+    body = gzip.decompress(answer.body) if answer.content_encoding == "gzip" else answer.body
+    if answer.status != 200 or (answer.content_encoding is None) != (kind == "terrarium") or body != files.get(any_tile):
+        faults.append("%s as clients ask for it: status %d, %s" % (any_tile, answer.status, answer.content_encoding))
+    others = beside(places)
+    for place in sorted(others):
+        if server.ask(root + path_of(place)).status != 404:
+            faults.append(path_of(place) + " is not there, and the service answers")
     status, said = server.stop()
     if status != 0:
         faults.append("the service ended with %d: %s" % (status, said))
-    return len(tiles), len(beside - tiles), faults
+    return len(places), len(others), faults
 
 
-def judge_compressed(database, folder):
+def judge_compressed(kind, database, folder):
     """Unpacked, what --gzip writes is what is written without."""
     packed = folder + ".gz"
-    said, status = s.run([s.RQT, "tiles", database, "-o", packed, "--gzip"])
+    said, status = s.run([s.RQT, "tiles", database, "--kind", kind, "-o", packed, "--gzip"])
     if status != 0:
         return [said]
     theirs, mine = read_files(packed), read_files(folder)
     shutil.rmtree(packed)
+    is_packed = {path: data[:2] == b"\x1f\x8b" for path, data in theirs.items()}
     return [path for path in sorted(set(theirs) | set(mine))
-            if path not in theirs or path not in mine or (theirs[path] if path == "layer.json" else gzip.decompress(theirs[path])) != mine[path]]
+            if path not in theirs or path not in mine or (gzip.decompress(theirs[path]) if is_packed[path] else theirs[path]) != mine[path] or
+            is_packed[path] != (path.rsplit(".")[-1] not in ("json", "png"))]
 
 
-def judge_refusal(database, said):
+def judge_refusal(kind, database, said):
     """A terrain without tiles: the command and the service say why."""
     server = service.Service(database)
-    answer = server.ask("/collections/t/tiles/quantized-mesh/layer.json")
+    answer = server.ask("/collections/t/tiles/%s/%s" % (kind, KINDS[kind][0]))
     server.stop()
     return [] if NO_TILES in said and answer.status == 400 and NO_TILES in answer.detail() else [said, answer.detail()]
 
 
-def judge_raster(path, sea):
-    """Prints its table; False when something is not as promised. None: import refuses the raster."""
-    name = os.path.basename(path).split(".")[0]
-    database, folder = s.temp("tiles.gpkg"), s.temp("tiles")
+def judge_kind(kind, raster, database, sea):
+    """Prints its table; False when something is not as promised."""
+    name, folder = os.path.basename(raster).split(".")[0], s.temp("tiles")
     shutil.rmtree(folder, ignore_errors=True)
-    if os.path.exists(database):
-        os.remove(database)
-    try:
-        s.import_terrain(database, path, name="t", **({} if sea is None else {"sea": sea}))
-    except RuntimeError as error:
-        print("%s is skipped: %s" % (name, str(error).strip().splitlines()[-1]), file=sys.stderr)
-        return None
     start = time.perf_counter()
-    said, status = s.run([s.RQT, "tiles", database, "-o", folder])
+    said, status = s.run([s.RQT, "tiles", database, "--kind", kind, "-o", folder])
     seconds = time.perf_counter() - start
     if status != 0:
-        faults = judge_refusal(database, said)
-        print("\n%s: %s" % (name, said.strip()))
+        faults = judge_refusal(kind, database, said)
+        print("\n%s, %s: %s" % (name, kind, said.strip()))
     else:
-        print("\n%s: %d tiles in %.1f s\n" % (name, len(read_files(folder)) - 1, seconds), flush=True)
-        told, status = judge(path, folder, sea)
+        print("\n%s, %s: %d tiles in %.1f s\n" % (name, kind, len(read_files(folder)) - 1, seconds), flush=True)
+        told, status = judge(kind, raster, folder, sea)
         print(told, end="")
-        served, missing, faults = judge_service(database, "t", folder)
-        print("%s service: it has the %d tiles that are listed, byte for byte, and none of %d others" % ("FAILED" if faults else "ok", served, missing))
-        differing = judge_compressed(database, folder)
+        served, missing, faults = judge_service(kind, database, "t", folder)
+        print("%s service: it has the %d tiles that there are, byte for byte, and none of %d others" % ("FAILED" if faults else "ok", served, missing))
+        differing = judge_compressed(kind, database, folder)
         print("%s gzip: unpacked, compressed tiles are the same" % ("FAILED" if differing else "ok"))
         faults += differing
         if status != 0:
@@ -147,11 +166,26 @@ def judge_raster(path, sea):
     return not faults
 
 
+def judge_raster(path, kinds, sea):
+    """False when something is not as promised. None: import refuses the raster."""
+    database = s.temp("tiles.gpkg")
+    if os.path.exists(database):
+        os.remove(database)
+    try:
+        s.import_terrain(database, path, name="t", **({} if sea is None else {"sea": sea}))
+    except RuntimeError as error:
+        print("%s is skipped: %s" % (os.path.basename(path), str(error).strip().splitlines()[-1]), file=sys.stderr)
+        return None
+    return all([judge_kind(kind, path, database, sea) for kind in kinds])
+
+
 def main():
     if not os.path.exists(JUDGE):
         sys.exit("verify-tiles: %s is not there: make verify-tiles builds it" % JUDGE)
-    sea = os.environ.get("SEA")
-    verdicts = {path: judge_raster(path, sea) for path in rasters(sys.argv[1:] or [s.DATA])}
+    sea, kind = os.environ.get("SEA"), os.environ.get("KIND")
+    if kind and kind not in KINDS:
+        sys.exit("verify-tiles: KIND=%s is none of %s" % (kind, ", ".join(KINDS)))
+    verdicts = {path: judge_raster(path, [kind] if kind else list(KINDS), sea) for path in rasters(sys.argv[1:] or [s.DATA])}
     looked_at = [fine for fine in verdicts.values() if fine is not None]
     if not looked_at:
         sys.exit("verify-tiles: nothing could be imported")

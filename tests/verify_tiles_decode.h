@@ -6,39 +6,12 @@
 #ifndef VERIFY_TILES_DECODE_H
 #define VERIFY_TILES_DECODE_H
 
-#include <array>
+#include "verify_tiles_space.h"
+
 #include <cjson/cJSON.h>
-#include <cmath>
-#include <cstdint>
-#include <cstring>
-#include <map>
-#include <string>
-#include <vector>
 
 static constexpr int UNITS = 32767;
 enum Side { WEST, SOUTH, EAST, NORTH, SIDES };
-
-struct Vec {
-    double x = 0, y = 0, z = 0;
-};
-static inline Vec operator-(Vec a, Vec b) {
-    return {a.x - b.x, a.y - b.y, a.z - b.z};
-}
-static inline Vec operator+(Vec a, Vec b) {
-    return {a.x + b.x, a.y + b.y, a.z + b.z};
-}
-static inline Vec operator*(Vec a, double f) {
-    return {a.x * f, a.y * f, a.z * f};
-}
-static inline double dot(Vec a, Vec b) {
-    return a.x * b.x + a.y * b.y + a.z * b.z;
-}
-static inline Vec cross(Vec a, Vec b) {
-    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-static inline double length(Vec a) {
-    return std::sqrt(dot(a, a));
-}
 
 struct Tile {
     std::string problem; /* empty: it is as the format has it */

@@ -15,6 +15,8 @@ class Raster {
     int width = 0, height = 0;
     double x0 = 0, y0 = 0, dx = 1, dy = -1;
     bool has_sea = false;
+    double rounding =
+        0; /* what storing may move a height by: a half of 1/1024 m where it has fractions of metres */
 
     /* sea: what voids are, NAN when they stay voids. False after a sentence on stderr. */
     bool open(const char *path, double sea) {
@@ -44,9 +46,13 @@ class Raster {
     bool is_sea(int c, int r) const { return has_sea && is_inside(c, r) && filled[index(c, r)]; }
     /* A corner of one of the terrain's smallest triangles, with three valid corners. */
     bool is_promised(size_t i) const { return promised[i]; }
+    /* However an outline moves by so many metres on the ground, it stays in the mesh. */
+    bool must_be_covered(size_t i, double error) const { return promised[i] && distances[i] * cell() > error; }
     /* To the next void, along rows or columns, whichever is more; far when there is none. */
     int void_distance(size_t i) const { return distances[i]; }
     double sample(size_t i) const { return heights[i]; }
+    /* Metres above what the raster has them above: the geoid mostly. */
+    double source(size_t i) const { return unlifted.empty() ? heights[i] : unlifted[i]; }
     Vec place(int c, int r) const { return ecef(lons[(size_t)c], lats[(size_t)r], heights[index(c, r)]); }
     /* Metres of ground that a sample takes, at most. */
     double cell() const { return std::max(dx, -dy) * RADIAN * EQUATOR; }
@@ -56,6 +62,12 @@ class Raster {
         if (c0 > c1 || r0 > r1) return 0;
         const auto sum = [&](int c, int r) { return sums[(size_t)r * (size_t)(width + 1) + (size_t)c]; };
         return sum(c1 + 1, r1 + 1) - sum(c0, r1 + 1) - sum(c1 + 1, r0) + sum(c0, r0);
+    }
+    /* Of the two halves of the square whose north-western sample this is: those with three valid corners. */
+    int half_cells(int c, int r) const {
+        int count = 0;
+        each_half(c, r, [&](size_t, size_t, size_t) { count++; });
+        return count;
     }
     /* By central differences in space; false where a neighbour is void. */
     bool normal(int c, int r, Vec &n) const {
@@ -68,7 +80,7 @@ class Raster {
     }
 
   private:
-    std::vector<double> heights;
+    std::vector<double> heights, unlifted; /* empty: the same */
     std::vector<uint8_t> promised, filled;
     std::vector<int> distances;
     std::vector<long> sums;
@@ -94,6 +106,8 @@ class Raster {
                 return false;
             for (int c = 0; c < width; c++)
                 row[c] = mask[(size_t)c] && std::isfinite(row[c]) ? (row[c] * scale + offset) * unit : NAN;
+            for (int c = 0; c < width && rounding == 0 && GDALDataTypeIsFloating(GDALGetRasterDataType(band)); c++)
+                if (std::floor(row[c]) < row[c]) rounding = 0.5 / 1024;
         }
         return true;
     }
@@ -110,6 +124,7 @@ class Raster {
     bool lift(GDALDatasetH source) {
         OGRSpatialReferenceH from = GDALGetSpatialRef(source);
         if (!from || !OSRIsCompound(from)) return true;
+        unlifted = heights;
         from = OSRClone(from);
         OGRSpatialReferenceH to = OSRNewSpatialReference(nullptr);
         OSRImportFromEPSG(to, 4979);
@@ -131,18 +146,17 @@ class Raster {
         return ok;
     }
     /* The diagonal of a cell goes through its corner with two odd coordinates (the lattice of the algorithm). */
+    template <typename Look> void each_half(int c, int r, Look look) const {
+        const int odd_c = c | 1, odd_r = r | 1, even_c = 2 * c + 1 - odd_c, even_r = 2 * r + 1 - odd_r;
+        if (!is_valid(odd_c, odd_r) || !is_valid(even_c, even_r)) return;
+        if (is_valid(odd_c, even_r)) look(index(odd_c, odd_r), index(even_c, even_r), index(odd_c, even_r));
+        if (is_valid(even_c, odd_r)) look(index(odd_c, odd_r), index(even_c, even_r), index(even_c, odd_r));
+    }
     void mark_promised() {
         promised.resize(heights.size());
         for (int r = 0; r + 1 < height; r++)
-            for (int c = 0; c + 1 < width; c++) {
-                const int odd_c = c | 1, odd_r = r | 1, even_c = 2 * c + 1 - odd_c, even_r = 2 * r + 1 - odd_r;
-                const int corners[2][2] = {{odd_c, even_r}, {even_c, odd_r}};
-                if (!is_valid(odd_c, odd_r) || !is_valid(even_c, even_r)) continue;
-                for (const auto &third : corners)
-                    if (is_valid(third[0], third[1]))
-                        promised[index(odd_c, odd_r)] = promised[index(even_c, even_r)] =
-                            promised[index(third[0], third[1])] = 1;
-            }
+            for (int c = 0; c + 1 < width; c++)
+                each_half(c, r, [&](size_t i, size_t j, size_t k) { promised[i] = promised[j] = promised[k] = 1; });
     }
     void measure_voids() {
         const int far = 1 << 28;

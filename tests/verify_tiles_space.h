@@ -6,13 +6,40 @@
 #ifndef VERIFY_TILES_SPACE_H
 #define VERIFY_TILES_SPACE_H
 
-#include "verify_tiles_decode.h"
-
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <map>
 #include <numeric>
+#include <string>
+#include <vector>
 
 static constexpr double RADIAN = 0.017453292519943295, EQUATOR = 6378137.0, FLATTENING = 1 / 298.257223563;
 static constexpr double POLE = EQUATOR * (1 - FLATTENING), E2 = FLATTENING * (2 - FLATTENING);
+
+struct Vec {
+    double x = 0, y = 0, z = 0;
+};
+static inline Vec operator-(Vec a, Vec b) {
+    return {a.x - b.x, a.y - b.y, a.z - b.z};
+}
+static inline Vec operator+(Vec a, Vec b) {
+    return {a.x + b.x, a.y + b.y, a.z + b.z};
+}
+static inline Vec operator*(Vec a, double f) {
+    return {a.x * f, a.y * f, a.z * f};
+}
+static inline double dot(Vec a, Vec b) {
+    return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+static inline Vec cross(Vec a, Vec b) {
+    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+static inline double length(Vec a) {
+    return std::sqrt(dot(a, a));
+}
 
 struct Angle {
     double sine, cosine;

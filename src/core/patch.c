@@ -306,15 +306,6 @@ void patch_leave_block(walk *w) {
     }
 }
 
-uint32_t patch_place(walk *w, uint32_t place) {
-    const uint32_t memo = w->memo[place];
-    if (memo >= w->live) return memo & INDEX;
-    const size_t index = w->patch->vertex_count++;
-    w->memo[place] = (uint32_t)index | FRESH;
-    w->order[index - w->first] = place;
-    return (uint32_t)index;
-}
-
 uint32_t patch_vertex(walk *w, const corner *c) {
     const bool has_place = c->place != NO_PLACE;
     if (has_place && !w->aliased) return patch_place(w, c->place);

@@ -20,7 +20,7 @@ int32_t rule_field_threshold(const rqt_rule *rule, rqt_code code, int rank);
 /* Is that, for every rank, the code or *most, whichever is less? */
 bool rule_takes_codes(const rqt_rule *rule, int32_t *most);
 
-/* Of a rule with a field, without places and forced vertices: chosen[i] = 1 for every vertex of the block that is
+/* Of a rule without places and forced vertices: chosen[i] = 1 for every vertex of the block that is
  * selected, row by row, else 0; 0 for its corners. What is selected, by error or a flag of the mask, must be
  * closed. Returns the flags that all of the chosen have. */
 uint8_t rule_choose(const rqt_rule *rule, const rqt_block_place *place, const rqt_block *block, uint8_t mask,

@@ -1,4 +1,4 @@
-/* rule_choose.c - what a rule with a field selects in a block.
+/* rule_choose.c - what a rule selects in a block by its field and by rank.
  *
  * From the block's cell down, from cells whose centre is selected to the vertices on their sides and to the centres
  * of their quarters: what is selected is closed, and every vertex of a closed cell but its corners descends from
@@ -28,11 +28,13 @@ typedef struct choosing {
     uint8_t *chosen;
     uint32_t n; /* vertices a side */
     uint8_t mask, all;
-    bool is_code; /* thresholds are codes, cut off at `most` */
+    const int32_t *by_rank; /* without a field: thresholds; else NULL */
+    bool is_code;           /* thresholds are codes, cut off at `most` */
     int32_t most;
 } choosing;
 
 static inline int32_t threshold_of(const choosing *c, rqt_code code, int rank) {
+    if (c->by_rank) return c->by_rank[rank];
     if (!c->is_code) return rule_field_threshold(c->rule, code, rank);
     return (int32_t)code < c->most ? (int32_t)code : c->most;
 }
@@ -183,6 +185,16 @@ static void choose_around(choosing *c, uint32_t middle, uint32_t half, int rank,
     }
 }
 
+/* Without a field. */
+static void choose_below(choosing *c, uint32_t middle, uint32_t half, int rank) {
+    static const child_codes none;
+    const cell_places at = places_around(c, middle, half);
+    if (!goes_on(c, &at, 0, rank)) return;
+    const unsigned quarters = choose_children(c, &at, &none, rank);
+    for (int i = 0; i < 4; i++)
+        if (quarters >> i & 1) choose_below(c, at.centre[i], at.half, rank - 2);
+}
+
 uint8_t rule_choose(const rqt_rule *rule, const rqt_block_place *place, const rqt_block *block, uint8_t mask,
                     uint8_t *chosen) {
     const uint32_t n = (UINT32_C(1) << block->k) + 1, half = n / 2, middle = half * n + half;
@@ -196,12 +208,17 @@ uint8_t rule_choose(const rqt_rule *rule, const rqt_block_place *place, const rq
     c.is_code = rule_takes_codes(rule, &c.most);
     memset(chosen, 0, (size_t)n * n);
     if (block->k == 0) return c.all;
+    const int rank = 2 * __builtin_ctz((unsigned)place->side) - 1;
+    if (!c.field) {
+        c.by_rank = rule_thresholds(rule);
+        if (choose_place(&c, middle, 0, rank)) choose_below(&c, middle, half, rank);
+        return c.all;
+    }
     field_node nine[9];
     for (int j = 0; j < 9; j++)
         nine[j] = field_node_at(c.field, place->x + (j % 3 - 1) * place->side, place->y + (j / 3 - 1) * place->side,
                                 place->side);
     const rqt_code least = least_of_nine(&c, nine);
-    const int rank = 2 * __builtin_ctz((unsigned)place->side) - 1;
     if (choose_place(&c, middle, least, rank)) choose_around(&c, middle, half, rank, nine, least);
     return c.all;
 }

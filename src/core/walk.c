@@ -64,20 +64,46 @@ static uint8_t choose_row(const rqt_code *restrict error, const uint8_t *restric
     return all;
 }
 
-/* By thresholds of ranks: what is selected is closed (rule.c), so nobody need go down to it. Rows whose numbers
- * have the same power of two in them have the same ranks; the first and the last one have those of the block's
- * sides. */
-static uint8_t choose_by_rank(const walk *w, const int32_t by_rank[RQT_RANKS], uint8_t mask) {
+/* By thresholds of ranks: what is selected is closed (rule.c), so nobody need go down to it. A vertex of the block
+ * has the rank that the powers of two in its column and row give it, where the sides have as many as the block is
+ * wide; corners alone may have more. So rows whose numbers have the same power of two in them have the same ranks.
+ */
+static uint8_t choose_rows_by_rank(const walk *w, const int32_t by_rank[RQT_RANKS], uint8_t mask) {
     int32_t threshold[RQT_MAX_BLOCK_K + 1][(1 << RQT_MAX_BLOCK_K) + 1];
-    const uint32_t n = (uint32_t)w->n;
-    for (uint32_t power = 0; 1U << power < n; power++)
-        for (uint32_t u = 0; u < n; u++)
-            threshold[power][u] = by_rank[rqt_vertex_rank(&w->query->lattice, place_vertex(w, (n << power) + u))];
+    const uint32_t n = (uint32_t)w->n, k = (uint32_t)w->query->k;
+    const int32_t *const from = by_rank + 2 * __builtin_ctz((unsigned)w->place.stride);
+    for (uint32_t power = 0; power <= k; power++)
+        for (uint32_t u = 0; u < n; u++) {
+            const uint32_t other = (uint32_t)__builtin_ctz(u | (n - 1));
+            threshold[power][u] = from[2 * (power < other ? power : other) + (power == other)];
+        }
+    for (uint32_t u = 0; u < n; u += n - 1)
+        threshold[k][u] = by_rank[rqt_vertex_rank(&w->query->lattice, place_vertex(w, (n - 1) * n + u))];
     uint8_t all = 0xFF;
     for (uint32_t v = 0; v < n; v++)
         all &= choose_row(w->block->error + n * v, w->block->flags + n * v, threshold[__builtin_ctz(v | (n - 1))],
                           n, mask, w->chosen + n * v);
     return all;
+}
+
+/* Are so many selected that going through all is quicker than going down to them? By a few of every second row and
+ * column, centres of cells. */
+static bool are_many(const walk *w, const int32_t by_rank[RQT_RANKS]) {
+    enum { LOOKS = 4 };
+    const uint32_t k = (uint32_t)w->query->k, n = (uint32_t)w->n, apart = n / LOOKS,
+                   first = 2; /* n - 1 is 16 or more */
+    if (k < 4) return true;
+    const int32_t threshold = by_rank[2 * (__builtin_ctz((unsigned)w->place.stride) + 1) + 1];
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < LOOKS * LOOKS; i++)
+        count += w->block->error[(i / LOOKS * apart + first) * n + i % LOOKS * apart + first] > threshold;
+    return count > LOOKS * LOOKS / 4;
+}
+
+static uint8_t choose_by_rank(const walk *w, uint8_t mask) {
+    const int32_t *const by_rank = rule_thresholds(w->query->rule);
+    return are_many(w, by_rank) ? choose_rows_by_rank(w, by_rank, mask)
+                                : rule_choose(w->query->rule, &w->place, w->block, mask, w->chosen);
 }
 
 /* Where places or forced vertices are near: down from the block's centre, as far as they are selected. */
@@ -115,7 +141,7 @@ static uint8_t choose_by_rule(const walk *w, uint8_t mask) {
     if (c.range.least == c.range.most && c.range.least >= 0 && !c.range.forced)
         return choose_by_error(w->block, (size_t)n * n, (rqt_code)c.range.least, mask, w->chosen);
     const bool is_plain = !c.range.places && !c.range.forced;
-    if (is_plain && !rule_field(w->query->rule)) return choose_by_rank(w, rule_thresholds(w->query->rule), mask);
+    if (is_plain && !rule_field(w->query->rule)) return choose_by_rank(w, mask);
     if (is_plain) return rule_choose(w->query->rule, &w->place, w->block, mask, w->chosen);
     memset(w->chosen, 0, (size_t)n * n);
     /* The diagonal from one corner to the one across; query.c has the same cases. */
@@ -324,20 +350,54 @@ static rqt_relation relation_of(const walk *w, rqt_vertex a, rqt_vertex b, rqt_v
     return rqt_region_box_relation(w->query->region, x0, y0, x1, y1);
 }
 
-static void walk_triangle(walk *w, const half *h, bool inside) {
-    if (inside && w->plain) {
-        walk_plain(w, h);
-        return;
+/* All of it is the region's, and of its leaves those are kept whose corners are valid. */
+static void walk_valid(walk *w, const half *from) {
+    half stack[MOST_SPLITS + 1], *top = stack, h = *from;
+    const uint8_t *const chosen = w->chosen, *const flags = w->block->flags;
+    const bool is_list = w->query->product == RQT_PRODUCT_TRIANGLES;
+    uint32_t *const out = w->patch->triangles;
+    for (;;) {
+        const uint32_t m = (h.l + h.r) / 2;
+        if (h.splits > 0 && chosen[m]) {
+            *top++ = (half){m, h.a, h.r, h.splits - 1, !h.clockwise};
+            h = (half){m, h.l, h.a, h.splits - 1, !h.clockwise};
+            continue;
+        }
+        if (flags[h.a] & flags[h.l] & flags[h.r] & RQT_VALID) {
+            const uint32_t a = patch_place(w, h.a), l = patch_place(w, h.l), r = patch_place(w, h.r);
+            if (is_list) {
+                uint32_t *const t = out + 3 * w->patch->triangle_count++;
+                t[0] = a;
+                t[1] = h.clockwise ? l : r;
+                t[2] = h.clockwise ? r : l;
+            } else {
+                patch_triangle(w, a, l, r, h.clockwise);
+            }
+        }
+        if (top == stack) return;
+        h = *--top;
     }
+}
+
+/* Is there nothing left to ask but what is selected, and valid? */
+static bool walk_whole(walk *w, const half *h) {
+    if (w->plain)
+        walk_plain(w, h);
+    else if (!w->clamped && !w->aliased && !w->query->wants_leaves)
+        walk_valid(w, h);
+    else
+        return false;
+    return true;
+}
+
+static void walk_triangle(walk *w, const half *h, bool inside) {
+    if (inside && walk_whole(w, h)) return;
     const corner a = block_corner(w, h->a), l = block_corner(w, h->l), r = block_corner(w, h->r);
     if (!inside) {
         const rqt_relation relation = relation_of(w, a.at, l.at, r.at);
         if (relation == RQT_OUTSIDE) return;
         inside = relation == RQT_INSIDE;
-        if (inside && w->plain) {
-            walk_plain(w, h);
-            return;
-        }
+        if (inside && walk_whole(w, h)) return;
     }
     const uint32_t m = (h->l + h->r) / 2;
     if (h->splits == 0 || !w->chosen[m]) {

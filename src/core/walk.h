@@ -106,7 +106,15 @@ void patch_enter_block(walk *w);
 void patch_leave_block(walk *w);
 /* The index of a corner in the patch, a new vertex if need be. */
 uint32_t patch_vertex(walk *w, const corner *c);
-uint32_t patch_place(walk *w, uint32_t place); /* not in a block that is aliased */
+/* Of a place of a block that is not aliased. */
+static inline uint32_t patch_place(walk *w, uint32_t place) {
+    const uint32_t memo = w->memo[place];
+    if (memo >= w->live) return memo & INDEX;
+    const size_t index = w->patch->vertex_count++;
+    w->memo[place] = (uint32_t)index | FRESH;
+    w->order[index - w->first] = place;
+    return (uint32_t)index;
+}
 /* A leaf by the indices of apex, left and right; do they turn clockwise in (col,row)? Then they are
  * counter-clockwise from above, for rows grow south. */
 void patch_triangle(walk *w, uint32_t a, uint32_t l, uint32_t r, bool clockwise);

@@ -56,6 +56,8 @@ static void list_requests(const store_terrain *t, const rqt_patch *patch, reques
     const int k = t->k, level = t->lattice.K - k;
     const int32_t last_i = t->lattice.width > 1 ? (t->lattice.width - 2) >> k : 0;
     const int32_t last_j = t->lattice.height > 1 ? (t->lattice.height - 2) >> k : 0;
+    int32_t last[2] = {-1, -1};
+    rqt_block_number number = 0;
     for (int side = OWN; side <= NORTH; side++) {
         if (side == EAST) continue;
         for (size_t v = 0; v < patch->vertex_count; v++) {
@@ -65,26 +67,31 @@ static void list_requests(const store_terrain *t, const rqt_patch *patch, reques
             if (side == NORTH && (row == 0 || j << k != row)) continue;
             if (side == WEST) i--;
             if (side == NORTH) j--;
-            add_request(list, rqt_block_number_of(level, i, j), (uint32_t)v);
+            if (i != last[0] || j != last[1]) number = rqt_block_number_of(level, last[0] = i, last[1] = j);
+            add_request(list, number, (uint32_t)v);
         }
     }
     qsort(list->row, list->count, sizeof *list->row, by_block);
 }
 
-/* What the block knows of the vertex's cross. */
-static void look(const store_terrain *t, const rqt_block_place *place, const rqt_block *block,
-                 const rqt_patch_vertex *v, cross *c) {
+/* What the block knows of the vertex's cross: all, but at its sides. */
+static inline void look(const store_terrain *t, const rqt_block_place *place, const rqt_block *block,
+                        const rqt_patch_vertex *v, cross *c) {
     static const int step[SIDES][2] = {{0, 0}, {-1, 0}, {1, 0}, {0, -1}, {0, 1}};
-    const int32_t side = 1 << t->k;
-    for (int n = 0; n < SIDES; n++) {
-        const int32_t col = v->col + step[n][0], row = v->row + step[n][1];
-        const int32_t x = col - (place->i << t->k), y = row - (place->j << t->k);
-        if (x < 0 || y < 0 || x > side || y > side) continue;
-        if (col >= t->lattice.width || row >= t->lattice.height) continue;
-        const size_t at = (size_t)y * (size_t)(side + 1) + (size_t)x;
+    const int32_t side = 1 << t->k, x = v->col - (place->i << t->k), y = v->row - (place->j << t->k);
+    const bool is_inside =
+        x > 0 && y > 0 && x < side && y < side && v->col < t->lattice.width - 1 && v->row < t->lattice.height - 1;
+    const ptrdiff_t n = side + 1, own = y * n + x;
+    for (int i = 0; i < SIDES; i++) {
+        const int32_t dx = step[i][0], dy = step[i][1];
+        const ptrdiff_t at = own + dy * n + dx;
+        if (!is_inside) {
+            if (x + dx < 0 || y + dy < 0 || x + dx > side || y + dy > side) continue;
+            if (v->col + dx >= t->lattice.width || v->row + dy >= t->lattice.height) continue;
+        }
         if (!(block->flags[at] & RQT_VALID)) continue;
-        c->q[n] = block->q[at];
-        c->known |= (uint8_t)(1 << n);
+        c->q[i] = block->q[at];
+        c->known |= (uint8_t)(1 << i);
     }
 }
 

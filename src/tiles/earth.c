@@ -4,21 +4,25 @@
 
 #include <math.h>
 
+#define E2 (EARTH_F * (2 - EARTH_F))
+
 void earth_angles_clear(earth_angles *angles) {
-    for (int i = 0; i < EARTH_KEPT; i++) angles->kept[i] = (earth_angle){.cosine = 1};
+    for (int i = 0; i < EARTH_KEPT; i++) angles->kept[i] = (earth_angle){.cosine = 1, .across = EARTH_A};
 }
 
 const earth_angle *earth_angle_of(earth_angles *angles, int number, double degrees) {
     earth_angle *k = &angles->kept[number % EARTH_KEPT];
-    if (k->degrees != degrees) *k = (earth_angle){degrees, sin(degrees * DEGREE), cos(degrees * DEGREE)};
+    if (k->degrees == degrees) return k;
+    const double sine = sin(degrees * DEGREE);
+    *k = (earth_angle){degrees, sine, cos(degrees * DEGREE), EARTH_A / sqrt(1 - E2 * sine * sine)};
     return k;
 }
 
 void earth_place(const earth_angle *lon, const earth_angle *lat, double height, double xyz[3]) {
-    const double e2 = EARTH_F * (2 - EARTH_F), n = EARTH_A / sqrt(1 - e2 * lat->sine * lat->sine);
+    const double n = lat->across;
     xyz[0] = (n + height) * lat->cosine * lon->cosine;
     xyz[1] = (n + height) * lat->cosine * lon->sine;
-    xyz[2] = (n * (1 - e2) + height) * lat->sine;
+    xyz[2] = (n * (1 - E2) + height) * lat->sine;
 }
 
 void earth_turn(const earth_angle *lon, const earth_angle *lat, const double enu[3], double xyz[3]) {

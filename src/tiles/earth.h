@@ -11,6 +11,7 @@
 
 typedef struct earth_angle {
     double degrees, sine, cosine;
+    double across; /* of a latitude: the radius of curvature across the meridian */
 } earth_angle;
 
 /* Vertices of a tile have few longitudes and latitudes: each is kept for the next that has it. */

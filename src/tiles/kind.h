@@ -3,6 +3,7 @@
  *   tiles.c          kinds; a connection's tiles: the plan of its terrain, kept while nothing changes
  *   pyramid.c        to disk
  *   earth.c          places and directions in space
+ *   seam.c           terrains that go around the Earth
  *   quantized_mesh/  each kind in a folder of its own, its parts told in its header
  *   blocks/          (3d-tiles)
  *   terrarium/
@@ -68,6 +69,21 @@ void tiles_add_attribution(const store_terrain *t, struct cJSON *document);
 void tiles_add_bounds(const store_terrain *t, double most_latitude, struct cJSON *document);
 /* The document's text as the answer; releases it and the JSON. */
 int tiles_print(struct cJSON *document, tile_bytes *out);
+/* The union of boxes of samples: x0, x1, y0, y1 of each. */
+int tiles_region(const tiles *t, const double (*boxes)[4], int count, rqt_region **region);
+/* A terrain whose first and last columns are one. */
+typedef struct tile_seam {
+    int32_t *q;     /* heights of the first column; NULL: they are two */
+    double merging; /* the last column's differ by no more: metres */
+} tile_seam;
+/* Are they one? *seam comes zeroed. */
+int seam_read(tiles *t, tile_seam *seam, char **error);
+void seam_free(tile_seam *seam);
+/* If so: forces the vertices of either column on the other in the options' rule. */
+int seam_close(tiles *t, double eps, const store_query_options *options, char **error);
+/* ... gives vertices of the last column the heights of the first; by how much samples of either may be off by that:
+ * metres. */
+double seam_merge(const tiles *t, const tile_seam *seam, rqt_patch *patch);
 /* Has the mesh of eps a triangle in a box of samples (west, east, north, south; cut at the raster's end)? *last: as
  * of store_mark. */
 int tiles_has_triangle(tiles *t, const int32_t box[4], double eps, const store_query_options *options,

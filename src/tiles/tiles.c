@@ -125,6 +125,30 @@ int tiles_print(cJSON *document, tile_bytes *out) {
     return out->bytes ? SQLITE_OK : SQLITE_NOMEM;
 }
 
+int tiles_region(const tiles *t, const double (*boxes)[4], int count, rqt_region **region) {
+    const rqt_placement as_it_is = {0, 0, 1, 1};
+    sqlite3_str *text = sqlite3_str_new(NULL);
+    for (int i = 0; i < count; i++) {
+        char ring[256];
+        const double x0 = boxes[i][0], x1 = boxes[i][1], y0 = boxes[i][2], y1 = boxes[i][3];
+        snprintf(ring, sizeof ring, "((%.17g %.17g,%.17g %.17g,%.17g %.17g,%.17g %.17g,%.17g %.17g))", x0, y0, x1,
+                 y0, x1, y1, x0, y1, x0, y0);
+        sqlite3_str_appendf(text, "%s%s", i ? "," : "MULTIPOLYGON(", ring);
+    }
+    sqlite3_str_appendall(text, ")");
+    const int size = sqlite3_str_length(text);
+    char *wkt = sqlite3_str_finish(text);
+    rqt_geometry *geometry = NULL;
+    rqt_message why;
+    rqt_status status =
+        wkt ? rqt_geometry_parse(wkt, (size_t)size, true, store_allocator(), &geometry, &why) : RQT_NO_MEMORY;
+    if (status == RQT_OK)
+        status = rqt_region_create(geometry, &as_it_is, &t->terrain->lattice, store_allocator(), region);
+    rqt_geometry_free(geometry);
+    sqlite3_free(wkt);
+    return status == RQT_OK ? SQLITE_OK : SQLITE_NOMEM;
+}
+
 int tiles_has_triangle(tiles *t, const int32_t box[4], double eps, const store_query_options *options,
                        rqt_block_number *last, bool *is_there, char **error) {
     const rqt_vertex from = {box[0], box[2]},

@@ -253,8 +253,6 @@ static void ask(input *in, const fuzz_terrain *t, pyramid *p, const rqt_allocato
             if (ok) HOLD(triangles_of(strip, n) == patch.triangle_count, "strip of %zu", n);
             (void)a->resize(a->context, strip, 0);
         }
-        if (ok && select == RQT_SELECT_THRESHOLD && query.product == RQT_PRODUCT_TRIANGLES)
-            look_at_marks(in, p, &query, &patch);
         if (ok && select == RQT_SELECT_THRESHOLD) {
             const int64_t x = take_between(in, -(1 << 20), FUZZ_SIDE << 20),
                           y = take_between(in, -(1 << 20), FUZZ_SIDE << 20);

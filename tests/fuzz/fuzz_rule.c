@@ -1,9 +1,10 @@
 /* fuzz_rule.c - rules: an eps of its own for places and for the squares of a field, eps lowered by rank, forced
- * vertices and borders; and what becomes of a patch: clipped, and as heights along lines. Whichever way vertices
+ * vertices and borders; and what becomes of a patch: clipped, as heights along lines, and cells in which it has
+ * triangles. Whichever way vertices
  * are selected the mesh is one; what a rule says of a vertex is what it says of its parts. */
 #include "fuzz_terrain.h"
 
-enum { PLACES = 4, POINTS = 12, SQUARES = 400 };
+enum { PLACES = 4, POINTS = 12, SQUARES = 400, CELLS = 7, PARTS = 8 };
 
 typedef struct ruling {
     rqt_rule *rule;
@@ -337,6 +338,83 @@ static void profile(input *in, const rqt_patch *patch, const rqt_lattice *l, con
     (void)a->resize(a->context, rows, 0);
 }
 
+/* --------------------------------------------------------------------------------------------------- cells */
+
+/* Lines in parts of a sample; between any two there is some of the raster. How many cells; 0: there are none. */
+static int32_t take_lines(input *in, int32_t samples, int64_t lines[CELLS + 1]) {
+    const int64_t end = PARTS * ((int64_t)samples - 1);
+    const int32_t most = take_between(in, 1, CELLS), size = (int32_t)(end / most) + 2;
+    int32_t count = 0;
+    lines[0] = take_between(in, -PARTS, 2 * PARTS);
+    if (lines[0] >= end) return 0;
+    while (count < most && (count == 0 || lines[count] < end)) {
+        const int64_t from = lines[count] > 0 ? lines[count] : 0;
+        lines[++count] = from + take_between(in, 1, size);
+    }
+    return count;
+}
+
+/* Have a triangle and a box inner points in common? Iff no side of one of them parts them. */
+static bool meets_inside(const rqt_patch *patch, size_t triangle, const int64_t box[4]) {
+    int64_t x[3], y[3];
+    for (size_t c = 0; c < 3; c++) {
+        const rqt_patch_vertex *v = &patch->vertices[patch->triangles[3 * triangle + c]];
+        x[c] = PARTS * (int64_t)v->col, y[c] = PARTS * (int64_t)v->row;
+    }
+    if ((x[0] <= box[0] && x[1] <= box[0] && x[2] <= box[0]) ||
+        (x[0] >= box[1] && x[1] >= box[1] && x[2] >= box[1]) ||
+        (y[0] <= box[2] && y[1] <= box[2] && y[2] <= box[2]) ||
+        (y[0] >= box[3] && y[1] >= box[3] && y[2] >= box[3]))
+        return false;
+    for (int c = 0; c < 3; c++) {
+        const int64_t ex = x[(c + 1) % 3] - x[c], ey = y[(c + 1) % 3] - y[c];
+        const int64_t third = ex * (y[(c + 2) % 3] - y[c]) - ey * (x[(c + 2) % 3] - x[c]);
+        bool is_parted = true;
+        for (int corner = 0; corner < 4; corner++) {
+            const int64_t side = ex * (box[2 + (corner >> 1)] - y[c]) - ey * (box[corner & 1] - x[c]);
+            is_parted &= third > 0 ? side <= 0 : side >= 0;
+        }
+        if (is_parted) return false;
+    }
+    return true;
+}
+
+/* A cell is marked iff the mesh has a triangle in it, as far as the patch is the whole mesh. */
+static void mark(input *in, const fuzz_terrain *t, pyramid *p, const rqt_query *query, const rqt_patch *patch) {
+    int64_t lines[2][CELLS + 1], places[2][CELLS + 1];
+    uint8_t marks[CELLS * CELLS] = {0};
+    const int32_t columns = take_lines(in, query->lattice.width, lines[0]),
+                  rows = take_lines(in, query->lattice.height, lines[1]);
+    rqt_cells cells = {places[0], places[1], columns, rows, marks};
+    if (columns == 0 || rows == 0) return;
+    for (int axis = 0; axis < 2; axis++)
+        for (int i = 0; i <= (axis ? rows : columns); i++) places[axis][i] = lines[axis][i] * (1 << 20) / PARTS;
+    for (size_t i = 0; i < query->answer_count; i++) {
+        const rqt_answer *answer = &query->answers[i];
+        rqt_block_place at;
+        (void)rqt_block_locate(&query->lattice, t->k, answer->number, &at);
+        const rqt_block *block = NULL;
+        if (rqt_query_selects_inside(query, answer)) block = pyramid_read(p, answer->number);
+        if (rqt_cells_lack(&cells, &query->lattice, &at)) rqt_query_mark(query, answer, block, &cells);
+    }
+    for (int32_t y = 0; y < rows; y++)
+        for (int32_t x = 0; x < columns; x++) {
+            const int64_t box[4] = {lines[0][x], lines[0][x + 1], lines[1][y], lines[1][y + 1]};
+            bool is_met = false;
+            for (size_t i = 0; i < patch->triangle_count && !is_met; i++) is_met = meets_inside(patch, i, box);
+            const bool is_marked = marks[y * columns + x];
+            HOLD(is_marked || !is_met, "cell (%d,%d) has a triangle and no mark", x, y);
+            HOLD(is_met || !is_marked || !rqt_region_is_all(query->region),
+                 "cell (%d,%d) has a mark and no triangle", x, y);
+        }
+    for (size_t i = 0; i < query->answer_count; i++) {
+        rqt_block_place at;
+        (void)rqt_block_locate(&query->lattice, t->k, query->answers[i].number, &at);
+        rqt_cells_fill(&cells, &query->lattice, &at);
+        HOLD(!rqt_cells_lack(&cells, &query->lattice, &at), "cells of a block lack marks when they have them");
+    }
+}
+
 static void ask(input *in, const fuzz_terrain *t, pyramid *p, const ruling *r, const rqt_region *region,
                 const rqt_allocator *a, fuzz_heap *h) {
     const rqt_lattice *l = &t->grid.lattice;
@@ -365,7 +443,7 @@ static void ask(input *in, const fuzz_terrain *t, pyramid *p, const ruling *r, c
         if (ok && select == 0) {
             clip(&patch, region, l, a, h);
             profile(in, &patch, l, a, h);
-            look_at_marks(in, p, &query, &patch);
+            if (take_between(in, 0, 1)) mark(in, t, p, &query, &patch);
         }
         rqt_patch_free(&patch);
         free(query.answers);

@@ -1,4 +1,4 @@
-/* fuzz_terrain.h - a terrain's whole pyramid in memory, queries of it, and what holds of their answers. */
+/* fuzz_terrain.h - a terrain's whole pyramid in memory, and queries of it. */
 #ifndef FUZZ_TERRAIN_H
 #define FUZZ_TERRAIN_H
 
@@ -111,66 +111,6 @@ static inline rqt_region *take_region(input *in, const rqt_lattice *l, const rqt
     HOLD(status == RQT_OK || status == RQT_NO_MEMORY, "%s", text);
     rqt_geometry_free(g);
     return region;
-}
-
-/* 2 .. FUZZ_LINES of them in the raster. */
-enum { FUZZ_LINES = 6 };
-static inline int32_t take_lines(input *in, int32_t samples, int64_t *lines) {
-    const int64_t end = (int64_t)(samples - 1) << 20;
-    const bool whole = take_between(in, 0, 2) == 0; /* or quarters of a sample, or any */
-    int32_t count = 0;
-    for (int64_t at = take_between(in, 0, 3) ? 0 : end / 3; count < FUZZ_LINES && at <= end;) {
-        lines[count++] = at;
-        at += whole ? (int64_t)take_between(in, 1, 12) << 18 : 1 + (int64_t)take_bits(in, 3);
-    }
-    if (count == 1) lines[count++] = end;
-    return count;
-}
-
-/* In which cells of some grid the answers have triangles, beside those of the patch that they have made: what lies
- * around a triangle's middle is marked; what is marked, when it is all of the mesh, lies within a triangle's box.
- */
-static inline void look_at_marks(input *in, pyramid *p, const rqt_query *query, const rqt_patch *patch) {
-    const rqt_lattice *l = &query->lattice;
-    int64_t x[FUZZ_LINES], y[FUZZ_LINES];
-    uint8_t marks[FUZZ_LINES * FUZZ_LINES] = {0}, near[FUZZ_LINES * FUZZ_LINES] = {0};
-    if (l->width < 2 || l->height < 2) return;
-    rqt_cells cells = {.x = x, .y = y, .marks = marks};
-    cells.columns = take_lines(in, l->width, x) - 1;
-    cells.rows = take_lines(in, l->height, y) - 1;
-    for (size_t i = 0; i < query->answer_count; i++) {
-        const rqt_answer *answer = &query->answers[i];
-        const bool needs = rqt_query_selects_inside(query, answer);
-        rqt_query_mark(query, answer, needs ? pyramid_read(p, answer->number) : NULL, &cells);
-    }
-    for (size_t t = 0; t < patch->triangle_count; t++) {
-        int64_t col = 0, row = 0, low[2] = {INT64_MAX, INT64_MAX}, high[2] = {0, 0}; /* col, row: three times */
-        for (size_t c = 0; c < 3; c++) {
-            const rqt_patch_vertex *v = &patch->vertices[patch->triangles[3 * t + c]];
-            const int64_t at[2] = {(int64_t)v->col << 20, (int64_t)v->row << 20};
-            col += at[0], row += at[1];
-            for (int a = 0; a < 2; a++) {
-                low[a] = at[a] < low[a] ? at[a] : low[a];
-                high[a] = at[a] > high[a] ? at[a] : high[a];
-            }
-        }
-        for (int32_t n = 0; n < cells.columns * cells.rows; n++) {
-            const int64_t *cx = x + n % cells.columns, *cy = y + n / cells.columns;
-            near[n] |= cx[0] < high[0] && cx[1] > low[0] && cy[0] < high[1] && cy[1] > low[1];
-            HOLD(marks[n] || col < 3 * cx[0] || col > 3 * cx[1] || row < 3 * cy[0] || row > 3 * cy[1],
-                 "triangle %zu has inner points in cell %d", t, (int)n);
-        }
-    }
-    for (int32_t n = 0; n < cells.columns * cells.rows; n++)
-        HOLD(marks[n] == 0 || (marks[n] == 1 && (near[n] || !rqt_region_is_all(query->region))), "mark %d of %d",
-             marks[n], (int)n);
-    for (size_t i = 0; i < query->answer_count; i++) {
-        rqt_block_place at;
-        (void)rqt_block_locate(l, query->k, query->answers[i].number, &at);
-        rqt_cells_fill(&cells, l, &at);
-        HOLD(!rqt_cells_lack(&cells, l, &at), "block %llu lacks marks",
-             (unsigned long long)query->answers[i].number);
-    }
 }
 
 #endif

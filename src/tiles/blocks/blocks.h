@@ -4,6 +4,7 @@
  *   plan.c     levels and their tolerances, steps of positions
  *   tile.c     one tile by the index alone: is it there, what is it off, where does it lie
  *   mesh.c     the terrain's mesh of a cell, in space
+ *   normals.c  its normals
  *   skirt.c    walls that hang from its sides
  *   glb.c      both as glTF
  *   subtree.c  availability and metadata of some levels of tiles
@@ -18,11 +19,12 @@ enum { SUBTREE_LEVELS = 4 };
 enum { CONTENT, SUBTREES, BLOCK_SERIES };
 
 typedef struct block_level {
-    double error;  /* no valid sample is further from the mesh in space, before positions are rounded: metres */
-    double centre; /* what curvature takes from the two triangles that a cell is at least made of */
-    double step;   /* positions are whole ones: a power of two */
-    double round;  /* what rounding moves a vertex by, at most */
-    double wall;   /* how far walls hang down from sides of the level's cells (skirt.c) */
+    double error;   /* no valid sample is further from the mesh in space, before positions are rounded: metres */
+    double centre;  /* what curvature takes from the two triangles that a cell is at least made of */
+    double step;    /* positions are whole ones: a power of two */
+    double round;   /* what rounding moves a vertex by, at most; and what a seam does */
+    double wall;    /* how far walls hang down from sides of the level's cells (skirt.c) */
+    rqt_rule *rule; /* its mesh, in the cells that were asked for; NULL: none was */
 } block_level;
 
 /* What all tiles of a terrain have in common. */
@@ -31,8 +33,9 @@ typedef struct block_plan {
     block_level level[TILES_LEVELS];
     double sag[RQT_RANKS + 2]; /* what curvature takes from a triangle, by the rank of its split vertex + 2: [1] is
                                   that of half a square of one sample, which has none */
-    geo_frame *frame;          /* geocentric, geoid included */
-    geo_geoid geoid;           /* zeros without one */
+    tile_seam seam;
+    geo_frame *frame;                               /* geocentric, geoid included */
+    geo_geoid geoid;                                /* zeros without one */
     tile_range *ranges[BLOCK_SERIES][TILES_LEVELS]; /* NULL: not yet asked for */
     size_t range_count[BLOCK_SERIES][TILES_LEVELS];
 } block_plan;
@@ -49,6 +52,11 @@ typedef struct block_tile {
     int32_t i, j; /* the block's cell: from the west, from the north */
 } block_tile;
 block_tile block_tile_of(int level, int32_t x, int32_t y);
+/* Its samples, as far as there are any. */
+typedef struct block_cell {
+    rqt_vertex from, to; /* both are in it */
+} block_cell;
+block_cell block_cell_of(const tiles *t, block_tile tile);
 /* Is its block stored? */
 bool block_exists(const tiles *t, block_tile tile);
 /* What the index knows of a tile, given what it knows of the one above; of the whole terrain, for the root's. */
@@ -79,6 +87,18 @@ typedef struct block_mesh {
 /* Without a triangle where the tile has no content. */
 int block_mesh_make(tiles *t, block_tile tile, block_mesh *mesh, char **error);
 void block_mesh_free(tiles *t, block_mesh *mesh);
+/* Triangles of the level's mesh of which some have a vertex of the tile, at a part of its sides: those around it;
+ * and where the terrain closes and the tile is at an end, those at the other end, where the tile's vertices are
+ * those of the other column. */
+enum { AROUND_CELL, AT_LAST_COLUMN, AT_FIRST_COLUMN, BLOCK_PARTS };
+int block_mesh_around(tiles *t, block_tile tile, int part, rqt_patch *patch, char **error);
+/* Of a sample: columns that are one meridian have the same. */
+double block_longitude(const tiles *t, int32_t col);
+/* Places of a level's vertices, as a block_mesh has them; origin: chosen here, unless it has one. */
+int block_places(const tiles *t, const rqt_patch *patch, double step, double *origin, bool has_origin,
+                 int32_t **offset, char **error);
+/* The mesh has all else. */
+int block_normals(tiles *t, block_tile tile, block_mesh *mesh, char **error);
 
 /* The walls of a tile: no part of the mesh, of whose error they know nothing. */
 typedef struct block_skirt {

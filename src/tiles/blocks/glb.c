@@ -131,8 +131,8 @@ static void add_box(const part *p, double step, cJSON *positions) {
         double at[3];
         turn(xyz, at);
         for (int k = 0; k < 3; k++) {
-            low[k] = fmin(low[k], at[k]);
-            high[k] = fmax(high[k], at[k]);
+            if (at[k] < low[k]) low[k] = at[k];
+            if (at[k] > high[k]) high[k] = at[k];
         }
     }
     add_numbers(positions, "min", low, 3);

@@ -78,10 +78,11 @@ static double size_of_tiles(const store_terrain *t, const geo_extent *e, int l) 
 /* What two sides on a line differ by is no more than a level's error and what rounding moves either; the end of a
  * wall is rounded too. Twice that: skirt.c. Levels whose triangles go through the Earth have walls that stay in it.
  */
-static void set_step(block_level *level, double step) {
+static void set_step(block_level *level, double step, double merging) {
+    const double rounding = step * sqrt(3) / 2 * (1 + 1e-9) + DOUBLES;
     level->step = step;
-    level->round = step * sqrt(3) / 2 * (1 + 1e-9) + DOUBLES;
-    level->wall = fmin(2 * (level->error + 3 * level->round), DEEPEST);
+    level->round = rounding + merging;
+    level->wall = fmin(2 * (level->error + 3 * rounding), DEEPEST); /* both columns have the same heights */
 }
 
 static void set_levels(const store_terrain *t, const rqt_code largest[RQT_MAX_K + 1], block_plan *plan) {
@@ -93,11 +94,11 @@ static void set_levels(const store_terrain *t, const rqt_code largest[RQT_MAX_K 
         set_error(t, em, l, plan);
         const double size = size_of_tiles(t, &e, l);
         double step = ldexp(1, FIRST_STEP);
-        set_step(level, step);
+        set_step(level, step, plan->seam.merging);
         /* Half of it to either side; the origin may be off the middle by half a metre or a step; walls hang down
          * from there, and lean out by as much at most. */
         while ((size / 2 + 2 + 2 * step + (l > 0 ? 1.5 * plan->level[1].wall : 0)) / step >= ldexp(1, STEP_BITS))
-            set_step(level, step *= 2);
+            set_step(level, step *= 2, plan->seam.merging);
     }
 }
 
@@ -131,6 +132,7 @@ int block_plan_create(tiles *t, void **out, char **error) {
     if (!plan) return SQLITE_NOMEM;
     *plan = (block_plan){.finest = terrain->lattice.K - terrain->k};
     code = make_frame(terrain, is_above_geoid, plan, error);
+    if (code == SQLITE_OK) code = seam_read(t, &plan->seam, error);
     if (code == SQLITE_OK) {
         set_levels(terrain, largest, plan);
         *out = plan;
@@ -144,7 +146,9 @@ void block_plan_free(void *made) {
     block_plan *plan = made;
     if (!plan) return;
     geo_frame_free(plan->frame);
+    for (int l = 0; l < TILES_LEVELS; l++) rqt_rule_free(plan->level[l].rule);
     for (int series = 0; series < BLOCK_SERIES; series++)
         for (int l = 0; l < TILES_LEVELS; l++) sqlite3_free(plan->ranges[series][l]);
+    seam_free(&plan->seam);
     sqlite3_free(plan);
 }

@@ -44,6 +44,13 @@ bool block_exists(const tiles *t, block_tile tile) {
     return rqt_block_locate(&t->terrain->lattice, t->terrain->k, number_of(tile), &place) == RQT_OK;
 }
 
+block_cell block_cell_of(const tiles *t, block_tile tile) {
+    const rqt_lattice *lattice = &t->terrain->lattice;
+    const int32_t side = 1 << (lattice->K - tile.level);
+    const rqt_vertex from = {tile.i * side, tile.j * side};
+    return (block_cell){from, rqt_vertex_clamp(lattice, (rqt_vertex){from.x + side, from.y + side})};
+}
+
 int block_has_content(tiles *t, block_tile tile, const store_relief *relief, bool *has, char **error) {
     const rqt_lattice *lattice = &t->terrain->lattice;
     *has = relief->is_valid && lattice->width > 1 && lattice->height > 1;
@@ -96,13 +103,10 @@ static void find_geoid(const block_plan *plan, const double box[4], double *low,
 void block_region(const tiles *t, block_tile tile, const store_relief *relief, double region[6]) {
     const block_plan *plan = block_plan_of(t);
     const block_level *level = &plan->level[tile.level];
-    const rqt_lattice *lattice = &t->terrain->lattice;
     const rqt_placement *at = &t->terrain->placement;
-    const int32_t side = 1 << (lattice->K - tile.level);
-    const rqt_vertex from = {tile.i * side, tile.j * side},
-                     to = rqt_vertex_clamp(lattice, (rqt_vertex){from.x + side, from.y + side});
-    const double box[4] = {at->x0 + from.x * at->dx, at->y0 + to.y * at->dy, at->x0 + to.x * at->dx,
-                           at->y0 + from.y * at->dy};
+    const block_cell cell = block_cell_of(t, tile);
+    const double box[4] = {at->x0 + cell.from.x * at->dx, at->y0 + cell.to.y * at->dy, at->x0 + cell.to.x * at->dx,
+                           at->y0 + cell.from.y * at->dy};
     const double swell = fmin(level->centre, level->error), moved = swell + level->round;
     double low = 0, high = 0;
     if (plan->geoid.most > 0) find_geoid(plan, box, &low, &high);

@@ -110,7 +110,7 @@ static around list_samples(const tiles *t, const rqt_cut_vertex *v, rqt_patch *s
     const int32_t last = t->terrain->lattice.width - 1;
     const double col = floor(v->col), row = floor(v->row), right = v->col - col, down = v->row - row;
     /* On a seam: the mean of both columns. */
-    const bool is_seam = plan_of(t)->seam && (v->col <= 0 || v->col >= last);
+    const bool is_seam = plan_of(t)->seam.q && (v->col <= 0 || v->col >= last);
     for (int i = 0; i < 4; i++) {
         const double weight = (is_seam ? 0.5 : i & 1 ? right : 1 - right) * (i & 2 ? down : 1 - down);
         if (weight <= 0) continue;

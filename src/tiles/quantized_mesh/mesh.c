@@ -199,7 +199,7 @@ static int cut_patch(tiles *t, const tile_place *place, rqt_patch *patch, tile_m
         code = store_query(t->store, t->terrain, region, plan_of(t)->level[place->z].eps, &options, patch, NULL,
                            error);
     if (code == SQLITE_OK) {
-        mesh->merged = seam_merge(t, patch);
+        mesh->merged = seam_merge(t, &plan_of(t)->seam, patch);
         const rqt_status status = rqt_cut_make(patch, region, &t->terrain->lattice, store_allocator(),
                                                store_wait_is_over, &w, &mesh->cut);
         code = status == RQT_OK ? SQLITE_OK : status == RQT_INTERRUPTED ? w.code : SQLITE_NOMEM;

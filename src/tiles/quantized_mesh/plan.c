@@ -40,7 +40,8 @@ enum { LARGEST_TILE = 64, FIRST_STEP = -10, UNIT_BITS = 20 };
 
 /* ------------------------------------------------------------------------------------------------- levels -- */
 
-int plan_rule(const tiles *t, rqt_rule **rule, char **error) {
+/* A rule like the plan's. */
+static int make_plain_rule(const tiles *t, rqt_rule **rule, char **error) {
     rqt_status status = rqt_rule_create(&t->terrain->lattice, t->terrain->quantum_error, store_allocator(), rule);
     if (status == RQT_OK) status = rqt_rule_set_lowering(*rule, plan_of(t)->lowering);
     return status == RQT_OK          ? SQLITE_OK
@@ -65,7 +66,7 @@ static int make_rule(tiles *t, bool is_above_geoid, char **error) {
         plan->geoid = frame;
     else
         geo_frame_free(frame);
-    return plan_rule(t, &plan->rule, error);
+    return make_plain_rule(t, &plan->rule, error);
 }
 
 static void set_heights(const store_terrain *t, tile_plan *plan) {
@@ -86,7 +87,7 @@ static int set_levels(const store_terrain *t, tile_plan *plan, char **error) {
     for (int z = 0; z < TILES_LEVELS; z++) {
         tile_level *level = &plan->level[z];
         const double side = ldexp(180, -z), unit = side * DEGREE / TILE_UNITS * plan->radius;
-        const double move = hypot(M_SQRT2 * unit, plan->step / 2 + plan->merging);
+        const double move = hypot(M_SQRT2 * unit, plan->step / 2 + plan->seam.merging);
         level->geometric_error = ldexp(ROOT_ERROR, -z);
         const double least = fmax(2 * move, plan->rounded + move);
         if (z > 0 && least > level->geometric_error) break; /* finer than heights are told */
@@ -126,6 +127,25 @@ static int keep_ground(tiles *t, char **error) {
     return SQLITE_OK;
 }
 
+/* Around the Earth levels have rules of their own: those that have none yet. */
+static int close_seam(tiles *t, char **error) {
+    tile_plan *plan = plan_of(t);
+    int code = SQLITE_OK;
+    for (int z = 0; z <= plan->finest && plan->seam.q && code == SQLITE_OK; z++) {
+        store_query_options options = plan_options(t, z);
+        rqt_rule *rule = NULL;
+        if (plan->level[z].rule) continue;
+        code = make_plain_rule(t, &rule, error);
+        options.rule = rule;
+        if (code == SQLITE_OK) code = seam_close(t, plan->level[z].eps, &options, error);
+        if (code == SQLITE_OK)
+            plan->level[z].rule = rule;
+        else
+            rqt_rule_free(rule);
+    }
+    return code;
+}
+
 /* What takes no time. */
 static int begin_plan(tiles *t, tile_plan **out, char **error) {
     const store_terrain *terrain = t->terrain;
@@ -138,7 +158,7 @@ static int begin_plan(tiles *t, tile_plan **out, char **error) {
     *plan = (tile_plan){.rounded = terrain->quantum_error};
     t->plan = plan;
     code = make_rule(t, is_above_geoid, error);
-    if (code == SQLITE_OK) code = seam_read(t, error);
+    if (code == SQLITE_OK) code = seam_read(t, &plan->seam, error);
     if (code == SQLITE_OK) {
         set_heights(terrain, plan);
         code = set_levels(terrain, plan, error);
@@ -158,7 +178,7 @@ int plan_create(tiles *t, void **out, char **error) {
     if (code != SQLITE_OK) return code;
     t->plan = *out = plan;
     code = keep_ground(t, error);
-    if (code == SQLITE_OK) code = seam_close(t, error);
+    if (code == SQLITE_OK) code = close_seam(t, error);
     t->plan = NULL;
     if (code == SQLITE_OK || (code & 0xFF) == SQLITE_INTERRUPT) return code;
     plan_free(plan);
@@ -172,7 +192,7 @@ void plan_free(void *made) {
     rqt_rule_free(plan->rule);
     geo_frame_free(plan->geoid);
     sqlite3_free(plan->sea);
-    sqlite3_free(plan->seam);
+    seam_free(&plan->seam);
     for (int z = 0; z < TILES_LEVELS; z++) {
         rqt_rule_free(plan->level[z].rule);
         sqlite3_free(plan->ranges[z]);
@@ -330,19 +350,7 @@ bool plan_cells(const tiles *t, int z, int turn, tile_range *range, int64_t *x, 
 }
 
 int plan_region(const tiles *t, const tile_place *place, rqt_region **region) {
-    const rqt_placement as_it_is = {0, 0, 1, 1};
-    char text[MOST_TURNS * 256] = "MULTIPOLYGON(", *end = text + strlen(text);
-    rqt_geometry *geometry = NULL;
-    rqt_message why;
-    for (int i = 0; i < place->turns; i++) {
-        const double *box = place->turn[i].cut;
-        end += sprintf(end, "%s((%.17g %.17g,%.17g %.17g,%.17g %.17g,%.17g %.17g,%.17g %.17g))", i ? "," : "",
-                       box[0], box[2], box[1], box[2], box[1], box[3], box[0], box[3], box[0], box[2]);
-    }
-    sprintf(end, ")");
-    rqt_status status = rqt_geometry_parse(text, strlen(text), true, store_allocator(), &geometry, &why);
-    if (status == RQT_OK)
-        status = rqt_region_create(geometry, &as_it_is, &t->terrain->lattice, store_allocator(), region);
-    rqt_geometry_free(geometry);
-    return status == RQT_OK ? SQLITE_OK : SQLITE_NOMEM;
+    double boxes[MOST_TURNS][4];
+    for (int i = 0; i < place->turns; i++) memcpy(boxes[i], place->turn[i].cut, sizeof boxes[i]);
+    return tiles_region(t, boxes, place->turns, region);
 }

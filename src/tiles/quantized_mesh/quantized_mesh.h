@@ -2,7 +2,6 @@
  *
  *   quantized_mesh.c  the kind
  *   plan.c            levels and their tolerances, heights, where tiles lie on the raster
- *   seam.c            terrains that go around the Earth
  *   mesh.c            the terrain's mesh, cut to a tile and quantised; what it is off
  *   speck.c           what a tile has where it has no terrain
  *   globe.c           places in space: bounding sphere, horizon, normals
@@ -46,9 +45,8 @@ typedef struct tile_plan {
     double rounded;      /* the terrain's quantum_error */
     double lowering[RQT_RANKS]; /* what curvature takes of eps */
     rqt_rule *rule;             /* with it */
-    int32_t *seam;              /* heights of the first column, if the last one is the same; else NULL */
-    double merging;             /* the last column's differ by no more: metres */
-    geo_frame *geoid;           /* NULL: heights are the ellipsoid's */
+    tile_seam seam;
+    geo_frame *geoid; /* NULL: heights are the ellipsoid's */
     geo_geoid undulation;
     bool has_sea;
     sea_run *sea;
@@ -94,16 +92,6 @@ bool plan_cells(const tiles *t, int z, int turn, tile_range *range, int64_t *x, 
 int plan_region(const tiles *t, const tile_place *place, rqt_region **region);
 /* The options of every query of a level. */
 store_query_options plan_options(const tiles *t, int z);
-/* A rule like the plan's. */
-int plan_rule(const tiles *t, rqt_rule **rule, char **error);
-
-/* Are the terrain's first and last columns one? Fills the plan's seam and merging. */
-int seam_read(tiles *t, char **error);
-/* If so: gives levels rules of their own, those that have none yet. */
-int seam_close(tiles *t, char **error);
-/* ... gives vertices of the last column the heights of the first; by how much samples of either may be off by that:
- * metres. */
-double seam_merge(const tiles *t, rqt_patch *patch);
 
 typedef struct tile_mesh {
     rqt_cut cut;         /* vertices in samples */

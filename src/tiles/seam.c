@@ -12,13 +12,13 @@
  * in voids or by more than levels can bear, are two: no mesh is true to both.
  */
 #include "earth.h"
-#include "quantized_mesh.h"
+#include "kind.h"
 
 #include <math.h>
 #include <string.h>
 
-/* Of a sample's width on the ground. The last level's geometric error is four times that, or more: it has 32
- * samples a side at least. */
+/* Of a sample's width on the ground. The last level of quantized-mesh has a geometric error of four times that, or
+ * more: it has 32 samples a side at least. */
 #define MOST_MERGED (1.0 / 32)
 
 static void compare_columns(const store_terrain *t, const int32_t *q, const uint8_t *valid, double *most) {
@@ -30,35 +30,35 @@ static void compare_columns(const store_terrain *t, const int32_t *q, const uint
     }
 }
 
-int seam_read(tiles *t, char **error) {
+int seam_read(tiles *t, tile_seam *seam, char **error) {
     const store_terrain *terrain = t->terrain;
-    tile_plan *plan = plan_of(t);
     const int32_t w = terrain->lattice.width, h = terrain->lattice.height;
     if (fabs((w - 1) * terrain->placement.dx - 360) > 1e-9 * 360) return SQLITE_OK;
-    plan->seam = sqlite3_malloc64(2 * (sqlite3_uint64)h * sizeof *plan->seam);
+    seam->q = sqlite3_malloc64(2 * (sqlite3_uint64)h * sizeof *seam->q);
     uint8_t *valid = sqlite3_malloc64(2 * (sqlite3_uint64)h);
-    int code = plan->seam && valid ? SQLITE_OK : SQLITE_NOMEM;
+    int code = seam->q && valid ? SQLITE_OK : SQLITE_NOMEM;
     for (int c = 0; c < 2 && code == SQLITE_OK; c++)
-        code = store_window(t->store, terrain, c ? w - 1 : 0, 0, 1, h, plan->seam + c * h, valid + c * h, error);
-    if (code == SQLITE_OK) compare_columns(terrain, plan->seam, valid, &plan->merging);
-    if (code != SQLITE_OK || plan->merging > terrain->placement.dx * DEGREE * EARTH_A * MOST_MERGED) {
-        sqlite3_free(plan->seam);
-        plan->seam = NULL;
-        plan->merging = 0;
-    }
+        code = store_window(t->store, terrain, c ? w - 1 : 0, 0, 1, h, seam->q + c * h, valid + c * h, error);
+    if (code == SQLITE_OK) compare_columns(terrain, seam->q, valid, &seam->merging);
+    if (code != SQLITE_OK || seam->merging > terrain->placement.dx * DEGREE * EARTH_A * MOST_MERGED)
+        seam_free(seam);
     sqlite3_free(valid);
     return code;
 }
 
-double seam_merge(const tiles *t, rqt_patch *patch) {
-    const tile_plan *plan = plan_of(t);
+void seam_free(tile_seam *seam) {
+    sqlite3_free(seam->q);
+    *seam = (tile_seam){0};
+}
+
+double seam_merge(const tiles *t, const tile_seam *seam, rqt_patch *patch) {
     const int32_t last = t->terrain->lattice.width - 1;
     double most = 0;
-    for (size_t i = 0; plan->seam && i < patch->vertex_count; i++) {
+    for (size_t i = 0; seam->q && i < patch->vertex_count; i++) {
         rqt_patch_vertex *v = &patch->vertices[i];
         if (v->col != 0 && v->col != last) continue;
-        v->q = plan->seam[v->row];
-        most = plan->merging; /* of the first column too, where samples of the last one are as well */
+        v->q = seam->q[v->row];
+        most = seam->merging; /* of the first column too, where samples of the last one are as well */
     }
     return most;
 }
@@ -77,12 +77,11 @@ static int make_rims(const store_terrain *t, rqt_region **region) {
 }
 
 /* The rows in which the level's mesh has vertices on the first column, and on the last one. */
-static int read_rows(tiles *t, const rqt_region *rims, double eps, rqt_rule *rule, uint8_t *on, char **error) {
+static int read_rows(tiles *t, const rqt_region *rims, double eps, const store_query_options *options, uint8_t *on,
+                     char **error) {
     const int32_t w = t->terrain->lattice.width, h = t->terrain->lattice.height;
-    store_query_options options = plan_options(t, 0);
     rqt_patch patch = {0};
-    options.rule = rule;
-    const int code = store_query(t->store, t->terrain, rims, eps, &options, &patch, NULL, error);
+    const int code = store_query(t->store, t->terrain, rims, eps, options, &patch, NULL, error);
     memset(on, 0, 2 * (size_t)h);
     for (size_t i = 0; i < patch.vertex_count && code == SQLITE_OK; i++) {
         const rqt_patch_vertex *v = &patch.vertices[i];
@@ -93,41 +92,32 @@ static int read_rows(tiles *t, const rqt_region *rims, double eps, rqt_rule *rul
     return code;
 }
 
-static int close_level(tiles *t, const rqt_region *rims, double eps, rqt_rule *rule, uint8_t *on, char **error) {
+/* on: room for four columns. */
+static int force_rows(tiles *t, const rqt_region *rims, double eps, const store_query_options *options, uint8_t *on,
+                      char **error) {
     const int32_t w = t->terrain->lattice.width, h = t->terrain->lattice.height;
     uint8_t *forced = on + 2 * (size_t)h;
     int code = SQLITE_OK;
     memset(forced, 0, 2 * (size_t)h);
     for (bool more = true; more && code == SQLITE_OK;) {
-        code = read_rows(t, rims, eps, rule, on, error);
+        code = read_rows(t, rims, eps, options, on, error);
         more = false;
         for (int32_t y = 0; y < h && code == SQLITE_OK; y++) {
             const int lacks = on[y] ? 1 : 0; /* the column that has no vertex there */
             if (on[y] == on[h + y] || forced[lacks * h + y]) continue;
             forced[lacks * h + y] = 1;
             more = true;
-            if (rqt_rule_force(rule, (rqt_vertex){lacks ? w - 1 : 0, y}) != RQT_OK) code = SQLITE_NOMEM;
+            if (rqt_rule_force(options->rule, (rqt_vertex){lacks ? w - 1 : 0, y}) != RQT_OK) code = SQLITE_NOMEM;
         }
     }
     return code;
 }
 
-int seam_close(tiles *t, char **error) {
-    tile_plan *plan = plan_of(t);
-    if (!plan->seam) return SQLITE_OK;
+int seam_close(tiles *t, double eps, const store_query_options *options, char **error) {
     rqt_region *rims = NULL;
     uint8_t *on = sqlite3_malloc64(4 * (sqlite3_uint64)t->terrain->lattice.height);
     int code = on ? make_rims(t->terrain, &rims) : SQLITE_NOMEM;
-    for (int z = 0; z <= plan->finest && code == SQLITE_OK; z++) {
-        rqt_rule *rule = NULL;
-        if (plan->level[z].rule) continue;
-        code = plan_rule(t, &rule, error);
-        if (code == SQLITE_OK) code = close_level(t, rims, plan->level[z].eps, rule, on, error);
-        if (code == SQLITE_OK)
-            plan->level[z].rule = rule;
-        else
-            rqt_rule_free(rule);
-    }
+    if (code == SQLITE_OK) code = force_rows(t, rims, eps, options, on, error);
     rqt_region_free(rims);
     sqlite3_free(on);
     return code;
