@@ -381,7 +381,9 @@ int store_mark(store *s, const store_terrain *t, double eps, const store_query_o
     if (code != SQLITE_OK) return code;
     box_of(cells, box);
     code = find_answers(s, t, box, options->outline, query.eps, &list, &sentence);
-    if (code == SQLITE_OK && options->rule && rqt_rule_set_eps(options->rule, eps) == RQT_OK)
+    if (code == SQLITE_OK && options->rule)
+        code = store_fail_core(&sentence, rqt_rule_set_eps(options->rule, eps), "query");
+    if (code == SQLITE_OK && options->rule)
         code = refine_answers(s, t, box, options->outline, options->rule, &list, &sentence);
     if (list.count > 0) qsort(list.rows, list.count, sizeof *list.rows, by_number);
     for (size_t i = 0; i < list.count && code == SQLITE_OK; i++) {

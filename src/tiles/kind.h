@@ -34,7 +34,8 @@ struct tiles {
     const store_terrain *terrain; /* likewise */
     void *plan;                   /* likewise: the kind's own */
     int last;                     /* likewise: of tiles_tell */
-    bool goes_on;                 /* tiles_goes_on */
+    bool is_kept;                 /* is what is worked out there the next time? */
+    bool goes_on;                 /* was a search interrupted? */
     kept_plan kept[KEPT_PLANS];
     int next; /* place of the plan that goes next */
 };

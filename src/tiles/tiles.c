@@ -226,6 +226,7 @@ static int find_plan(tiles *t, char **error) {
     int code = SQLITE_OK;
     if (!kept->is_whole) code = t->kind->functions->plan_create(t, &kept->plan, error);
     kept->is_whole = code == SQLITE_OK;
+    t->is_kept = kept->state != 0;
     if (kept->is_whole)
         t->plan = kept->plan;
     else if (kept->plan)
@@ -259,7 +260,7 @@ void tiles_tell(tiles *t, int last) {
 }
 
 bool tiles_goes_on(const tiles *t) {
-    return t->goes_on;
+    return t->goes_on && t->is_kept;
 }
 
 int tiles_finest(const tiles *t) {

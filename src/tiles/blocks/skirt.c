@@ -26,7 +26,7 @@
  * Earth's radius, whatever its level is off (plan.c).
  *
  * None hangs from the outline of the raster, nor around voids: nothing is beside them, and what one would see there
- * is no terrain. A raster that goes once around the Earth has no outline in the west and east.
+ * is no terrain. A raster that closes around the Earth (seam.c) has no outline in the west and east.
  *
  * Walls begin at the surface's own vertices, with its normals, so that they are lit as the ground is beside them.
  */
@@ -45,10 +45,6 @@ typedef struct cell_sides {
     double depth[4];                  /* of WEST, EAST, NORTH, SOUTH */
 } cell_sides;
 
-static bool is_around(const store_terrain *t) {
-    return fabs((t->lattice.width - 1) * t->placement.dx - 360) < 1e-9 * 360;
-}
-
 /* The coarsest level whose cells have a side on a line, which is counted in cells of a level; OUTLINE. */
 static int level_of_line(int level, int32_t line, int32_t cell, int32_t last) {
     if (line == 0 || (int64_t)line * cell >= last) return OUTLINE;
@@ -60,7 +56,7 @@ static cell_sides sides_of(const tiles *t, block_tile tile) {
     const block_plan *plan = block_plan_of(t);
     const rqt_lattice *lattice = &t->terrain->lattice;
     const int32_t cell = 1 << (lattice->K - tile.level), columns = lattice->width - 1, rows = lattice->height - 1;
-    const bool is_closed = tile.level > 0 && is_around(t->terrain);
+    const bool is_closed = tile.level > 0 && plan->seam.q;
     const int level[4] = {
         level_of_line(tile.level, tile.i, cell, columns), level_of_line(tile.level, tile.i + 1, cell, columns),
         level_of_line(tile.level, tile.j, cell, rows), level_of_line(tile.level, tile.j + 1, cell, rows)};

@@ -82,7 +82,7 @@ static int fill(tiles *t, block_tile root, subtree *s, char **error) {
 
 typedef struct buffer {
     cJSON *views;
-    uint8_t *bytes; /* NULL: only counted */
+    uint8_t *bytes;
     size_t size;
 } buffer;
 

@@ -86,6 +86,11 @@ static void begin_band(const tiles *t, layer_search *s) {
     begin_square(s);
 }
 
+/* Does a level need one? The first has all tiles, and without voids all that meet the raster are there. */
+static bool is_searched(const tiles *t, int z) {
+    return z > 0 && t->terrain->voids > 0;
+}
+
 static int begin_search(const tiles *t, int z, layer_search **out) {
     layer_search *s = sqlite3_malloc(sizeof *s);
     if (!s) return SQLITE_NOMEM;
@@ -93,11 +98,11 @@ static int begin_search(const tiles *t, int z, layer_search **out) {
     int code = tiles_add_range(&s->list.all, (tile_range){0}); /* so that there is memory even for none */
     s->list.all.count = 0;
     s->count = plan_ranges(t, z, s->all);
-    for (int i = 0; i < s->count; i++) {
+    for (int i = 0; i < s->count && is_searched(t, z); i++) {
         s->band[i] = sqlite3_malloc64((sqlite3_uint64)(s->all[i].x1 - s->all[i].x0 + 1) * SQUARE);
         if (!s->band[i]) code = SQLITE_NOMEM;
     }
-    if (code == SQLITE_OK && s->count > 0) {
+    if (code == SQLITE_OK && s->count > 0 && is_searched(t, z)) {
         s->y = s->all[0].y0; /* all ranges have the same rows */
         begin_band(t, s);
     }
@@ -179,13 +184,12 @@ static int find_tiles(tiles *t, int z, range_list *list, char **error) {
     layer_search **s = &plan_of(t)->search[z];
     int code = *s ? SQLITE_OK : begin_search(t, z, s);
     if (code != SQLITE_OK) return code;
-    if (z == 0) {
-        code = add_range(&(*s)->list, (tile_range){0, 1, 0, 0});
-    } else if (t->terrain->voids == 0) {
-        for (int i = 0; i < (*s)->count && code == SQLITE_OK; i++) code = add_range(&(*s)->list, (*s)->all[i]);
-    } else {
+    if (is_searched(t, z))
         code = search(t, z, *s, error);
-    }
+    else if (z == 0)
+        code = add_range(&(*s)->list, (tile_range){0, 1, 0, 0});
+    else
+        for (int i = 0; i < (*s)->count && code == SQLITE_OK; i++) code = add_range(&(*s)->list, (*s)->all[i]);
     if ((code & 0xFF) == SQLITE_INTERRUPT) {
         t->goes_on = true;
         return code;

@@ -15,10 +15,9 @@
  * and where lines of the lattice cross lines of pixels. These are few loops over arrays. A cell of the lattice that
  * lies in one of pixels needs no Q: F - B' is linear on its sides, and on its diagonal a parabola (see below),
  * whose bulge is the less the smaller the cell. Half cells whose other half has no height, and leaves that reach
- * beyond the raster, are no such cells: they are looked at as triangles. There plane
- * - B' has no extremes inside a cell of pixels either, being a saddle; on sides that slant it is a parabola, at
- * most |k du dv| / 4 from the chord. So it is enough to walk along the sides from line to line, and to look at the
- * pixels inside.
+ * beyond the raster, are no such cells: they are looked at as triangles. There the plane less B' has no extremes
+ * inside a cell of pixels either, being a saddle; on sides that slant it is a parabola, at most |k du dv| / 4 from
+ * the chord. So it is enough to walk along the sides from line to line, and to look at the pixels inside.
  *
  * Only the largest sum counts, and how large it is at least is known: vertices are samples. So this is a branch and
  * bound, as in core/update_bound: of the boxes of blocks the one with the largest sum gives way to its children,
