@@ -823,7 +823,7 @@ s.equal("... and the service ends well", server.process.wait(30), 0)
 
 # What closes the Earth is read along both columns, more than any tile has.
 server = service.Service(EARTH.database, "--max-triangles", "500")
-answer = server.ask("/collections/etopo1_1deg/tiles/quantized-mesh/layer.json")
+answer = server.ask("/collections/earth/tiles/quantized-mesh/layer.json")
 s.equal("limits are those of answers, not of what closes the Earth", (answer.status, answer.body), (200, files(EARTH.folder)["layer.json"]))
 server.process.terminate()
 s.equal("... and the service ends well", server.process.wait(30), 0)
