@@ -741,9 +741,11 @@ typedef struct rqt_leaf_corner {
 rqt_found rqt_query_leaf_at(const rqt_query *query, const rqt_answer *answer, const rqt_block *block, int64_t x,
                             int64_t y, rqt_leaf_corner leaf[3]);
 
-/* Where a mesh has triangles: cells between lines, each of which has inner points in the raster's rectangle. */
+/* Where a mesh has triangles: cells of a grid in the raster's rectangle, which has an area. All is the caller's. */
 typedef struct rqt_cells {
-    const int64_t *x, *y;  /* lines in 2^-20 samples: columns + 1, rows + 1 of them, each further than the last */
+    /* Lines in 2^-20 samples, from 0 to the last sample: columns + 1, rows + 1 of them, each further than the one
+     * before. */
+    const int64_t *x, *y;
     int32_t columns, rows; /* 1 or more */
     uint8_t *marks;        /* of each cell, row by row: 1, a triangle has inner points in it; 0 to begin with */
 } rqt_cells;
@@ -752,8 +754,9 @@ bool rqt_cells_lack(const rqt_cells *cells, const rqt_lattice *lattice, const rq
 /* Marks all of those. */
 void rqt_cells_fill(rqt_cells *cells, const rqt_lattice *lattice, const rqt_block_place *place);
 /* Marks the cells in which the leaves of an answer have inner points. Of the query lattice, k, eps, rule, outline
- * are read; select is threshold. block: as for rqt_query_leaf_at, where rqt_query_selects_inside says so. When all
- * answers that have points in common with a cell have been asked, its mark is right. Exact. */
+ * are read; select is threshold. block: as for rqt_query_leaf_at, where rqt_query_selects_inside says so; one of
+ * another k, or an answer that is no block of the lattice, marks nothing. When all answers that have points in
+ * common with a cell have been asked, its mark is right. Exact. */
 void rqt_query_mark(const rqt_query *query, const rqt_answer *answer, const rqt_block *block, rqt_cells *cells);
 
 /* ----------------------------------------------------------------------------------------------- cut --

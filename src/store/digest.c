@@ -1,10 +1,11 @@
-/* digest.c - a number for all that is stored of a terrain, by which two states of it are told apart wherever the
- * file is and whatever its time: a checkpoint of the log, VACUUM, a copy, or another terrain beside it change
- * nothing.
+/* digest.c - a number for what is stored of a terrain, by which two states of it are told apart wherever the file
+ * is and whatever its time: a checkpoint of the log, VACUUM, a copy of the file, or another terrain beside it
+ * change nothing.
  *
  * Of a block its number, its summary, its size and the header of its bytes, which holds a checksum over all of them
- * (FORMAT.md): so one page a block is read, and not the whole. Columns of the terrain's row and the runs of what
- * was filled go in as they are.
+ * (FORMAT.md): so one page a block is read, and not the whole; bytes that their checksum does not fit are for
+ * whoever decodes them to see. Columns of the terrain's row and the runs of what was filled go in as they are. The
+ * index does not: it is made of what the summaries say.
  */
 #include "internal.h"
 

@@ -308,8 +308,7 @@ int store_query_tables(store *s, const store_terrain *t, store_question *questio
     return code;
 }
 
-/* ------------------------------------------------------------------------------------------- which cells it meets
- */
+/* -------------------------------------------------------------------------------------- which cells it meets -- */
 
 typedef struct covered {
     bool all, nothing;

@@ -106,8 +106,9 @@ void store_reads_free(store_reads *reads);
 /* The patch of region at eps (metres; checked here: NaN and negative are SQLITE_ERROR). reads may be NULL. */
 int store_query(store *s, const store_terrain *t, const rqt_region *region, double eps,
                 const store_query_options *options, rqt_patch *patch, store_reads *reads, char **error);
-/* Marks the cells in which that mesh has triangles; options: those of metric exact and select threshold. *last: 0,
- * or, with the marks as they are, what a call that was interrupted has left: this one goes on from there. */
+/* Marks the cells in which that mesh has triangles. eps: 0 or more; options: those of metric exact and select
+ * threshold. *last: 0, or, with the marks as they are, what a call that was interrupted has left: this one goes on
+ * from there, while the terrain is as it was. */
 int store_mark(store *s, const store_terrain *t, double eps, const store_query_options *options, rqt_cells *cells,
                rqt_block_number *last, char **error);
 /* A query within a budget: the mesh of the smallest eps' >= eps that has at most max_vertices (>= 4) vertices in
@@ -181,8 +182,9 @@ typedef struct store_finding {
 int store_check(store *s, const store_terrain *t, bool (*tell)(void *context, const store_finding *finding),
                 void *context, char **error);
 
-/* A number that two states of a terrain have in common when all that is stored of it is the same, and, as numbers
- * of 64 bits go, only then. Reads a page of each block. */
+/* A number that two states of a terrain have in common when its row, its blocks and what was filled are the same,
+ * and, as numbers of 64 bits go, only then. Reads a page of each block. Not the index, which follows from the
+ * blocks, nor minimal errors that are stored beside them. */
 int store_digest(store *s, const store_terrain *t, uint64_t *digest, char **error);
 
 /* How many samples of the terrain were no data: [0] STORE_FILLED, [1] STORE_SEA. */

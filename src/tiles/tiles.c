@@ -154,7 +154,7 @@ int tiles_has_triangle(tiles *t, const int32_t box[4], double eps, const store_q
     const rqt_vertex from = {box[0], box[2]},
                      to = rqt_vertex_clamp(&t->terrain->lattice, (rqt_vertex){box[1], box[3]});
     const int64_t unit = INT64_C(1) << 20, x[2] = {from.x * unit, to.x * unit}, y[2] = {from.y * unit, to.y * unit};
-    uint8_t mark = 0;
+    uint8_t mark = 0; /* of this call alone: none is interrupted after it has marked its only cell */
     rqt_cells cell = {x, y, 1, 1, &mark};
     const bool has_area = from.x < to.x && from.y < to.y;
     const int code = has_area ? store_mark(t->store, t->terrain, eps, options, &cell, last, error) : SQLITE_OK;

@@ -1,8 +1,8 @@
 /* glb.c - a tile's mesh and its skirt as glTF 2.0, binary:
  *
  *   'glTF', u32 2, u32 size;  u32 size, 'JSON', text, blanks to 4 bytes;  u32 size, 'BIN', the buffer, zeros to 4
- *   buffer, for each primitive: positions of all vertices, three floats each; normals, three i8 and a zero;
- * indices, u16 where they fit, and zeros to 4
+ *   buffer, for each primitive: positions of all vertices, three floats each; normals, three i8 and a zero each;
+ *   indices, u16 where they fit, and zeros to 4 bytes
  *
  * Primitives. The first is the terrain, of which everything holds that is said of a tile. The second, which tiles
  * have that have neighbours, is its skirt (skirt.c): walls that hide what levels differ by, with vertices and
@@ -13,10 +13,10 @@
  * (X, Z, -Y) here.
  *
  * Where it is. The node's matrix moves by the origin, whole metres and steps, which is a double there whatever it
- * is printed with: clients of 3D Tiles multiply it with their matrices in double,
- * unlike viewers of models (format/glb.c). Positions are whole steps from it, as floats exactly. What two tiles
- * share is decoded to the same doubles in both: origin + position is exact. A translation would say the same, but
- * deck.gl leaves one of millions of metres to the floats of its shaders, where it is off by a quarter of a metre.
+ * is printed with: clients of 3D Tiles multiply it with their matrices in double, unlike viewers of models
+ * (format/glb.c). Positions are whole steps from it, as floats exactly. What two tiles share is decoded to the same
+ * doubles in both: origin + position is exact. A translation would say the same, but deck.gl leaves one of millions
+ * of metres to the floats of its shaders, where it is off by a quarter of a metre.
  *
  * Extras have what the tile is off (tile.c), as the subtree does.
  */

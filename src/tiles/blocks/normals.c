@@ -67,7 +67,7 @@ static int take_full_resolution(tiles *t, block_mesh *mesh, char **error) {
         earth_angles_clear(&known->lon);
         earth_angles_clear(&known->lat);
     }
-    const float *twins = enu + 3 * count;
+    const float *twins = code == SQLITE_OK ? enu + 3 * count : NULL;
     for (size_t i = 0; i < count && code == SQLITE_OK; i++) {
         const rqt_patch_vertex *v = &mesh->patch.vertices[i];
         rqt_patch_vertex twin;

@@ -16,9 +16,14 @@
  * Of two sides one above the other the higher one's wall reaches beyond the lower one. But sides are not quite
  * above each other: along a parallel, chords lie nearer to the pole than the arc does, the longer the more. The
  * side that faces the equator then leaves a sliver open, through which one who is right above sees the background.
- * Such a wall leans out by twice as much as its chord is off the arc: half way down it passes below the arc, no
- * further than wall(a) / 2 from the neighbour's side, whose wall hangs from wall(a) / 2 above there to as much
- * below. The two meet, whichever side is higher. Along meridians chords lie in the plane of the arc.
+ * Such a wall leans out by twice as much as its chord is off the arc: half way down, at the latest, it passes below
+ * the arc. Half way down it is below the neighbour's side, as that is less than wall(a) / 2 below its own, and not
+ * below the lower end of the neighbour's wall, as that is less than wall(a) / 2 above its own. The two meet,
+ * whichever side is higher. Along meridians chords lie in the plane of the arc.
+ *
+ * What is not closed: vertices of both levels are rounded to steps, sideways too, and walls do not lean for that.
+ * It is round(a) at most for either, a small part of what the level is off. And no wall is deeper than half the
+ * Earth's radius, whatever its level is off (plan.c).
  *
  * None hangs from the outline of the raster, nor around voids: nothing is beside them, and what one would see there
  * is no terrain. A raster that goes once around the Earth has no outline in the west and east.

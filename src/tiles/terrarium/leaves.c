@@ -1,5 +1,5 @@
-/* leaves.c - pixels of the levels that have pixels larger than samples: on a mesh whose vertices are
- * about as far apart as pixels. proof.c tells how far it is from what is drawn.
+/* leaves.c - pixels of the levels that have pixels larger than samples: on a mesh whose vertices are about as far
+ * apart as pixels. proof.c tells how far it is from what is drawn.
  *
  * Blocks of one level of the pyramid tile the terrain. Each, of stride s, keeps the vertices of its lattice whose
  * error is above its em, and those of the outline, which with its corners are a closed set; no vertex finer than s
@@ -153,9 +153,9 @@ static void draw_pixels(const lattice *l, const lattice_box *box) {
 /* The rows that a pixel's square takes, and a little more: the middle between rows in Mercator's plane is not the
  * one in latitude. */
 static void reach(const pixel_grid *g, int j, double *from, double *to) {
-    const double up = j > 0 ? g->row[j] - g->row[j - 1] : 0, down = j + 1 < GRID ? g->row[j + 1] - g->row[j] : 0;
-    *from = g->row[j] - 0.625 * up - SLACK;
-    *to = g->row[j] + 0.625 * down + SLACK;
+    const int above = j > 0 ? j - 1 : 0, below = j < GRID - 1 ? j + 1 : GRID - 1;
+    *from = g->row[j] - 0.625 * (g->row[j] - g->row[above]) - SLACK;
+    *to = g->row[j] + 0.625 * (g->row[below] - g->row[j]) + SLACK;
 }
 
 /* Pixels whose square meets a triangle are void. Squares reach to the middle between pixels, and a little further,

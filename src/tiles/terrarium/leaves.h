@@ -13,7 +13,7 @@ enum { HAS_HEIGHT = 1, IS_SAMPLE = 2 }; /* of a vertex: see lattice */
 
 /* A block on the turn that is at hand: the mesh of its leaves as heights at all vertices of its lattice. A vertex
  * that the block keeps is a sample; any other has the height of the leaf that it is in. So two triangles in each
- * cell of the lattice are the mesh (find_half has them), but for leaves that lattice_straddles tells. */
+ * cell of the lattice are the mesh (lattice_height has them), but for leaves that lattice_straddles tells. */
 typedef struct lattice {
     pixel_grid *g;
     const rqt_block *block; /* until another one is read */

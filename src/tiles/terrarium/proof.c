@@ -405,7 +405,7 @@ static bool is_whole(const lattice *l, const lattice_box *box) {
     if (box->east - box->west != BOX || box->south - box->north != BOX) return false;
     if (west < 0 || east < 0 || north < 0 || south < 0) return false;
     for (int j = north; j <= south; j++)
-        if (memchr(l->g->is_whole + (size_t)j * GRID + west, false, (size_t)(east - west) + 1)) return false;
+        if (memchr(l->g->is_whole + (size_t)j * GRID + west, 0, (size_t)(east - west) + 1)) return false;
     return true;
 }
 
