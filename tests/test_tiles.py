@@ -766,6 +766,12 @@ for name, sql in (("row", "UPDATE rqt_terrain SET source = 'elsewhere'"), ("summ
     db.close()
     out, status = s.run([s.RQT, "tiles", s.temp("changed.gpkg"), "-o", s.temp("logged")])
     s.check("... not with another " + name, status == 1 and "of another state of it" in out, out)
+db = s.connect(s.temp("changed.gpkg"), load=False)
+db.execute("UPDATE rqt_block_1 SET data = 7 WHERE id = (SELECT max(id) FROM rqt_block_1)")
+last = s.one(db, "SELECT max(id) FROM rqt_block_1")
+db.close()
+s.equal("a block that is not bytes is named", s.run([s.RQT, "tiles", s.temp("changed.gpkg"), "-o", s.temp("number")]),
+        ("rqt tiles: terrain coast is damaged: block %d\n" % last, 1))
 
 # --------------------------------------------------------------------------------------------------------- the service
 
@@ -812,6 +818,13 @@ s.check("who asks again for what takes too long is answered", service.wait_until
 s.check("... and was told to", any("ask again, and it goes on from here" in answer.detail() and answer.retry_after == "1" for answer in told[:-1]), [a.body[:200] for a in told[:3]])
 s.run([s.RQT, "tiles", bare, "-o", s.temp("bare")])
 s.equal("... with the same", told[-1].body, open(s.temp("bare") + "/layer.json", "rb").read())
+server.process.terminate()
+s.equal("... and the service ends well", server.process.wait(30), 0)
+
+# What closes the Earth is read along both columns, more than any tile has.
+server = service.Service(EARTH.database, "--max-triangles", "500")
+answer = server.ask("/collections/earth/tiles/quantized-mesh/layer.json")
+s.equal("limits are those of answers, not of what closes the Earth", (answer.status, answer.body), (200, files(EARTH.folder)["layer.json"]))
 server.process.terminate()
 s.equal("... and the service ends well", server.process.wait(30), 0)
 

@@ -58,6 +58,7 @@ static int mix_blocks(store *s, const store_terrain *t, uint64_t *h, char **erro
     char table[64];
     sqlite3_stmt *rows = NULL;
     sqlite3_blob *blob = NULL;
+    int64_t spoiled = 0;
     sqlite3_snprintf(sizeof table, table, "rqt_block_%lld", t->id);
     char *sql = sqlite3_mprintf("SELECT id, summary FROM \"%w\".%s ORDER BY id", t->schema, table);
     int code = sql ? sqlite3_prepare_v2(s->db, sql, -1, &rows, NULL) : SQLITE_NOMEM;
@@ -67,8 +68,12 @@ static int mix_blocks(store *s, const store_terrain *t, uint64_t *h, char **erro
         const void *summary = sqlite3_column_blob(rows, 1);
         *h = mix(mix(*h, &number, sizeof number), summary, (size_t)sqlite3_column_bytes(rows, 1));
         code = mix_block(s, t, table, number, &blob, h);
+        if (code == SQLITE_ERROR) spoiled = number; /* not even bytes */
     }
-    if (code != SQLITE_DONE && code != SQLITE_NOMEM) code = store_fail_db(error, s->db, code, "reading the blocks");
+    if (spoiled)
+        code = store_fail(error, SQLITE_CORRUPT_VTAB, "terrain %s is damaged: block %lld", t->name, spoiled);
+    else if (code != SQLITE_DONE && code != SQLITE_NOMEM)
+        code = store_fail_db(error, s->db, code, "reading the blocks");
     sqlite3_blob_close(blob);
     sqlite3_finalize(rows);
     return code;

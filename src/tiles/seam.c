@@ -116,8 +116,11 @@ static int force_rows(tiles *t, const rqt_region *rims, double eps, const store_
 int seam_close(tiles *t, double eps, const store_query_options *options, char **error) {
     rqt_region *rims = NULL;
     uint8_t *on = sqlite3_malloc64(4 * (sqlite3_uint64)t->terrain->lattice.height);
+    store_limits *limits = store_limits_of(t->store), of_answers = *limits;
     int code = on ? make_rims(t->terrain, &rims) : SQLITE_NOMEM;
+    limits->triangles = 0; /* both columns are in no answer */
     if (code == SQLITE_OK) code = force_rows(t, rims, eps, options, on, error);
+    *limits = of_answers;
     rqt_region_free(rims);
     sqlite3_free(on);
     return code;

@@ -72,6 +72,8 @@ MUTANTS = [
     ("tiles: anybody's folder will do", PYRAMID, "if ((size_t)n == size && memcmp(there, description, size) == 0) return SQLITE_OK;", "return SQLITE_OK;", TILES, "are not mixed in"),
     ("tiles: what nobody says anything of is ours", PYRAMID, "if (n == 0) code = check_empty(job->folder, error);", "if (n < 0) code = check_empty(job->folder, error);", TILES, "says nothing of its files"),
     ("digest: blocks are alike", "src/store/digest.c", "if (code == SQLITE_OK) *h = mix(mix(*h, &size, sizeof size), header, (size_t)n);", "", TILES, "another block"),
+    ("digest: what is not bytes is not named", "src/store/digest.c", "if (code == SQLITE_ERROR) spoiled = number;", "", TILES, "a block that is not bytes is named"),
+    ("seam: limits of answers are its own", "src/tiles/seam.c", "limits->triangles = 0;", "", TILES, "limits are those of answers"),
     ("digest: nothing was filled", "src/store/digest.c", "store_has_fill(s->db, t))", "!s)", TILES, "another sea"),
     ("tiles: two commands write into one folder", PYRAMID, "if (flock(*file, LOCK_EX | LOCK_NB))", "if (flock(*file, LOCK_UN))", TILES, "by one command at a time"),
     ("tiles: gzip is not asked for", PYRAMID, "if (p->job->gzip && !series->is_packed) code = pack(&tile);", "", TILES, "all tiles are compressed"),
