@@ -223,7 +223,7 @@ test-tiles: ## the tests of tiles for globes and maps under ASan and UBSan
 	@$(MAKE) --no-print-directory -j2 BUILD=$(BUILD)/sanitized OPTIMIZE=-O1 \
 	  SANITIZE="-fsanitize=address,undefined -fno-sanitize-recover=undefined" $(BUILD)/sanitized/rqt
 	@export ASAN_OPTIONS=detect_leaks=1 LSAN_OPTIONS=suppressions=$(CURDIR)/tests/leaks.supp:print_suppressions=0 RQT=$(CURDIR)/$(BUILD)/sanitized/rqt RQT_SO=$(CURDIR)/$(BUILD)/rqt.so; \
-	for kind in tiles tiles3d terrarium; do log=$(BUILD)/sanitized/test_$$kind.log; ./tests/test_$$kind.sh >$$log 2>&1 || { tail -n 60 $$log; exit 1; }; tail -n 1 $$log; done
+	for kind in tiles tiles_folder tiles3d terrarium; do log=$(BUILD)/sanitized/test_$$kind.log; ./tests/test_$$kind.sh >$$log 2>&1 || { tail -n 60 $$log; exit 1; }; tail -n 1 $$log; done
 
 test-web: ## the page in headless Chromium, and its modules in node; pictures in build/web-shots
 	@./src/install-packages.sh build test web browser

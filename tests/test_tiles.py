@@ -1,219 +1,21 @@
-"""Tiles for globes: decoded here from their bytes alone, and put beside the rasters that they are of.
+"""Tiles for globes: decoded from their bytes alone (tiles_support.py), and put beside the rasters that they are of.
 
-The decoder is written from the format's description (CesiumGS/quantized-mesh), the errors are measured at every sample, and
-the places in space are computed here: nothing is asked of the program but tiles.
+Errors are measured at every sample, and places in space are computed here: nothing is asked of the program but tiles.
 """
 import bisect
-import fcntl
-import gzip
-import itertools
 import json
 import math
 import os
 import random
-import shutil
-import signal
-import struct
-import subprocess
-import time
 from fractions import Fraction
 
 import serve_support as service
 import sql_support as s
+from tiles_support import A, B, E2, UNITS, Pyramid, bare_middles, coast, dot, files, listed, minus, pyramid, told_by, window
 
 SEED = int(os.environ.get("RQT_SEED", "1"))
 print("seed %d" % SEED)
 RANDOM = random.Random(SEED)
-UNITS = 32767
-A, F = 6378137.0, 1 / 298.257223563
-B, E2 = A * (1 - F), F * (2 - F)
-
-
-def ecef(lon, lat, h):
-    lon, lat = math.radians(lon), math.radians(lat)
-    n = A / math.sqrt(1 - E2 * math.sin(lat) ** 2)
-    return (n + h) * math.cos(lat) * math.cos(lon), (n + h) * math.cos(lat) * math.sin(lon), (n * (1 - E2) + h) * math.sin(lat)
-
-
-def minus(a, b):
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
-
-
-def dot(a, b):
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-class Bytes:
-    def __init__(self, data):
-        self.data, self.at = data, 0
-
-    def take(self, form):
-        values = struct.unpack_from("<" + form, self.data, self.at)
-        self.at += struct.calcsize("<" + form)
-        return values
-
-
-class Tile:
-    """What a client reads of a tile. problem: the first thing that is not as the format has it."""
-
-    def __init__(self, z, x, y, data):
-        self.z, self.x, self.y, self.problem, self.size = z, x, y, None, len(data)
-        self.side = 180 / 2**z
-        self.west, self.south = -180 + x * self.side, -90 + y * self.side
-        try:
-            self.read(data)
-        except (struct.error, ValueError, LookupError) as error:
-            self.problem = repr(error)
-
-    def read(self, data):
-        b = Bytes(data)
-        self.middle = b.take("3d")
-        self.low, self.high = b.take("2f")
-        self.centre, self.radius = b.take("3d"), b.take("d")[0]
-        self.horizon = b.take("3d")
-        self.count = b.take("I")[0]
-        self.u, self.v, self.h = (self.differences(b) for _ in range(3))
-        wide = self.count > 65536
-        index, size = ("I", 4) if wide else ("H", 2)
-        b.at += -b.at % size
-        codes = b.take("%d%s" % (3 * b.take("I")[0], index))
-        highest, self.triangles = 0, []
-        for code in codes:
-            if code > highest:
-                self.problem = "an index below 0"
-            self.triangles.append(highest - code)
-            highest += code == 0
-        if highest != self.count:
-            self.problem = "%d vertices are used, %d are there" % (highest, self.count)
-        self.triangles = [self.triangles[i:i + 3] for i in range(0, len(self.triangles), 3)]
-        # Of one vertex each, where the tile has no terrain.
-        self.specks = [t[0] for t in self.triangles if t[0] == t[1] == t[2]]
-        self.triangles = [t for t in self.triangles if not t[0] == t[1] == t[2]]
-        self.edges = [b.take("%d%s" % (b.take("I")[0], index)) for _ in range(4)]
-        self.extensions = {}
-        while b.at < len(data):
-            number, length = b.take("BI")
-            self.extensions[number] = data[b.at:b.at + length]
-            b.at += length
-        if b.at != len(data):
-            self.problem = "%d bytes, and it says %d" % (len(data), b.at)
-        length = struct.unpack("<I", self.extensions[4][:4])[0]
-        self.metadata = json.loads(self.extensions[4][4:4 + length])
-        step = (self.high - self.low) / UNITS
-        self.step = step
-        # As clients do: a linear interpolation.
-        self.places = [(self.west + u * self.side / UNITS, self.south + v * self.side / UNITS, self.low + (self.high - self.low) * (h / UNITS))
-                       for u, v, h in zip(self.u, self.v, self.h)]
-        self.xyz = [ecef(*p) for p in self.places]
-
-    def differences(self, b):
-        value, values = 0, []
-        for code in b.take("%dH" % self.count):
-            value += (code >> 1) ^ -(code & 1)
-            if not 0 <= value <= UNITS:
-                self.problem = "a number out of range"
-            values.append(value)
-        return values
-
-    def normal(self, i):
-        x, y = (c / 255 * 2 - 1 for c in self.extensions[1][2 * i:2 * i + 2])
-        z = 1 - abs(x) - abs(y)
-        if z < 0:
-            x, y = (1 - abs(y)) * (1 if x >= 0 else -1), (1 - abs(x)) * (1 if y >= 0 else -1)
-        length = math.sqrt(x * x + y * y + z * z)
-        return x / length, y / length, z / length
-
-    def area(self):
-        """Twice the sum of the areas, signed, in units."""
-        u, v = self.u, self.v
-        return sum((u[b] - u[a]) * (v[c] - v[a]) - (u[c] - u[a]) * (v[b] - v[a]) for a, b, c in self.triangles)
-
-
-def clip(shape, axis, value, sign):
-    """The part of a convex polygon of rational numbers where sign * (coordinate - value) >= 0."""
-    part = []
-    for p, q in zip(shape, shape[1:] + shape[:1]):
-        a, b = sign * (p[axis] - value), sign * (q[axis] - value)
-        if a >= 0:
-            part.append(p)
-        if a * b < 0:
-            part.append(tuple(c + (d - c) * a / (a - b) for c, d in zip(p, q)))
-    return part
-
-
-def bare_middles(tile):
-    """The middles of the sixteenths about which no triangle comes within three eighths of a sixteenth's side."""
-    bare, side, reach = [], 8192, 3072
-    for v in range(side // 2, 4 * side, side):
-        for u in range(side // 2, 4 * side, side):
-            for corners in tile.triangles:
-                shape = [(Fraction(tile.u[i]), Fraction(tile.v[i])) for i in corners]
-                if max(p[0] for p in shape) < u - reach or min(p[0] for p in shape) > u + reach or max(p[1] for p in shape) < v - reach or min(p[1] for p in shape) > v + reach:
-                    continue
-                for axis, middle in enumerate((u, v)):
-                    for sign in (1, -1):
-                        shape = clip(shape, axis, middle - sign * reach, sign)
-                if shape:
-                    break
-            else:
-                bare.append((u, v))
-    return bare
-
-
-def listed(layer):
-    """Every tile that layer.json has, z,x,y; some twice, if it has them so."""
-    return [(z, x, y) for z, ranges in enumerate(layer["available"]) for r in ranges
-            for y in range(r["startY"], r["endY"] + 1) for x in range(r["startX"], r["endX"] + 1)]
-
-
-def told_by(roots):
-    """Every tile that those of level 0 tell of: z,x,y; -1,x,y when it is in the other half of the globe."""
-    found = []
-    for half, root in roots.items():
-        for z, ranges in enumerate(root.metadata["available"], 1):
-            found += [(z if x >> z == half else -1, x, y) for r in ranges
-                      for y in range(r["startY"], r["endY"] + 1) for x in range(r["startX"], r["endX"] + 1)]
-    return found
-
-
-def files(folder):
-    found = {}
-    for path, _, names in os.walk(folder):
-        for name in names:
-            full = os.path.join(path, name)
-            with open(full, "rb") as f:
-                found[os.path.relpath(full, folder)] = f.read()
-    return found
-
-
-class Pyramid:
-    def __init__(self, name, database, raster, x0, y0, dx, dy, options=()):
-        self.name, self.folder, self.database = name, s.temp(name + ".tiles"), database
-        self.x0, self.y0, self.dx, self.dy, self.raster = x0, y0, dx, dy, raster
-        out, status = s.run([s.RQT, "tiles", database, "-o", self.folder, *options])
-        s.equal(name + ": rqt tiles says nothing in a pipe", (out, status), ("", 0))
-        with open(os.path.join(self.folder, "layer.json"), encoding="utf-8") as f:
-            self.layer = json.load(f)
-        self.tiles, self.empty = {}, {} # those with terrain in them, and those of level 0 without
-        if "--gzip" in options:
-            if not s.equal(name + ": all tiles are compressed", {data[:2] for path, data in files(self.folder).items() if path.endswith(".terrain")}, {b"\x1f\x8b"}):
-                s.finish()
-        for path, data in files(self.folder).items():
-            if path.endswith(".terrain"):
-                z, x, y = map(int, path[:-len(".terrain")].split("/"))
-                tile = Tile(z, x, y, gzip.decompress(data) if "--gzip" in options else data)
-                (self.empty if z == 0 and tile.problem is None and not tile.triangles else self.tiles)[z, x, y] = tile
-        self.space = {}
-
-    def sample(self, col, row):
-        z = self.raster[row][col]
-        return None if z is None else (self.x0 + col * self.dx, self.y0 + row * self.dy, z)
-
-    def place(self, col, row):
-        key = col, row
-        if key not in self.space:
-            self.space[key] = ecef(*self.sample(col, row))
-        return self.space[key]
 
 
 def distance_to_triangle(p, a, b, c):
@@ -437,22 +239,6 @@ def exact_range(p, z):
 
 # ------------------------------------------------------------------------------------------------------------- terrains
 
-def pyramid(name, path, source=None, options=(), **imports):
-    """The tiles of a terrain of this raster, with the heights that its source has."""
-    database = s.temp(name + ".gpkg")
-    s.import_terrain(database, path, name=name, **imports)
-    db = s.connect(database)
-    at = s.rows(db, "SELECT x0, y0, dx, dy FROM rqt_terrain")[0]
-    db.close()
-    return Pyramid(name, database, source or s.read_raster(path), *at, options=options)
-
-
-def window(name, source, *box):
-    path = s.temp(name + ".tif")
-    s.run(["gdal_translate", "-q", "-srcwin", *map(str, box), os.path.join(s.DATA, source), path])
-    return path
-
-
 def listed_exactly(p, is_whole):
     """Listed iff it has a triangle: by areas in rational numbers; where samples are void, by asking for the triangles."""
     asked = [(z, x, y) for z in range(len(p.layer["available"])) for _, x, y in sorted(exact_range(p, z))]
@@ -544,6 +330,13 @@ count_vertices(AFRICA)
 EARTH = pyramid("earth", os.path.join(s.DATA, "etopo1_1deg.tif"), options=["--gzip"])
 check_pyramid(EARTH, True)
 
+# What closes the Earth is read along both columns, more than any tile has.
+server = service.Service(EARTH.database, "--max-triangles", "500")
+answer = server.ask("/collections/earth/tiles/quantized-mesh/layer.json")
+s.equal("limits are those of answers, not of what closes the Earth", (answer.status, answer.body), (200, files(EARTH.folder)["layer.json"]))
+server.process.terminate()
+s.equal("... and the service ends well", server.process.wait(30), 0)
+
 # Voids, and none of them the border of anything.
 hole = s.rough_grid(150, 130, 7, relief=300)
 for row in range(130):
@@ -607,12 +400,7 @@ s.check("heights are lifted by the geoid, which lies some 50 m above the ellipso
 
 # --------------------------------------------------------------------------------------------------------------- water
 
-sea = s.rough_grid(140, 120, 3, relief=200)
-for row in range(120):
-    for col in range(140):
-        if math.hypot(col - 10, row - 20) > 52 + 8 * math.sin(row / 5) or (col - 20) ** 2 + (row - 30) ** 2 < 30:
-            sea[row][col] = None
-COAST = pyramid("coast", s.write_grid(s.temp("coast.asc"), sea, 5.01, 43.02, 1 / 1200, s.WGS84), [[0 if z is None else z for z in row] for row in sea], sea=0)
+COAST, sea = coast()
 check_pyramid(COAST, True)
 wrong, sizes = [], set()
 for key, t in COAST.tiles.items():
@@ -636,196 +424,5 @@ STEPS = pyramid("steps", s.write_grid(s.temp("steps.asc"), [[z + 0.25 for z in r
 check_pyramid(STEPS, True)
 last = STEPS.layer["geometricErrors"]
 s.check("steps: levels end where 5 m of rounding would be more than clients take them to be off", 5 < last[-1] < 2 * 5.2, last[-2:])
-
-# ------------------------------------------------------------------------------------------------------------ to disk
-
-whole = files(COAST.folder)
-again = s.temp("again")
-command = [s.RQT, "tiles", COAST.database, "-o", again]
-process = subprocess.Popen(command + ["--jobs", "1"])
-while process.poll() is None and sum(len(names) for _, _, names in os.walk(again)) < 12:
-    time.sleep(0.001)
-process.send_signal(signal.SIGKILL)
-process.wait()
-killed = {path: data for path, data in files(again).items() if path.endswith(".terrain")}
-s.check("killed, it leaves whole tiles and no layer.json (%d of %d)" % (len(killed), len(whole)),
-        0 < len(killed) < len(whole) - 2 and all(whole[path] == data for path, data in killed.items()) and not os.path.exists(again + "/layer.json"),
-        len(killed))
-kept, emptied = sorted(killed)[0], sorted(killed)[-1]
-os.truncate(os.path.join(again, emptied), 0) # as a cut of power may leave it
-before = os.stat(os.path.join(again, kept)).st_ino
-s.equal("the same command goes on there", s.run(command + ["--jobs", "2"]), ("", 0))
-s.equal("... and the folder is that of one that was not killed, byte for byte", files(again), whole)
-s.equal("... without making again what was there", os.stat(os.path.join(again, kept)).st_ino, before)
-with open(again + "/.rqt-tiles", "rb") as held:
-    fcntl.flock(held, fcntl.LOCK_EX)
-    out, status = s.run(command)
-s.check("... by one command at a time", status == 1 and "another rqt tiles is at work there" in out, out)
-out, status = s.run([s.RQT, "tiles", ALPS.database, "-o", again])
-s.check("tiles of another terrain are not mixed in", status == 1 and "holds tiles of another terrain" in out, out)
-out, status = s.run(command + ["--gzip"])
-s.check("... nor compressed ones", status == 1 and "holds tiles of another terrain" in out, out)
-os.remove(os.path.join(again, ".rqt-tiles"))
-out, status = s.run(command)
-s.check("... nor into a folder that says nothing of its files", status == 1 and "holds files that are not of rqt tiles" in out and not os.path.exists(again + "/.rqt-tiles"), out)
-packed = s.temp("packed")
-s.equal("--gzip", s.run([s.RQT, "tiles", COAST.database, "-o", packed, "--gzip", "--levels", "3-9"]), ("", 0))
-s.equal("... has the same tiles, compressed", {path: gzip.decompress(data) for path, data in files(packed).items() if path.endswith(".terrain")},
-        {path: data for path, data in whole.items() if path.endswith(".terrain") and 3 <= int(path.split("/")[0]) <= 9})
-with open(packed + "/layer.json", encoding="utf-8") as f:
-    some = json.load(f)
-s.equal("... and a layer.json of the levels asked for", (some["minzoom"], some["maxzoom"], some["available"][2], some["available"][3:10]),
-        (3, 9, [], COAST.layer["available"][3:10]))
-top = s.temp("top")
-s.equal("--levels 0-4", s.run([s.RQT, "tiles", COAST.database, "-o", top, "--levels", "0-4"]), ("", 0))
-roots = {x: Tile(0, x, 0, files(top)["0/%d/0.terrain" % x]) for x in (0, 1)}
-s.equal("... has tiles of level 0 that tell of no others than there are", sorted(told_by(roots)), sorted(k for k in COAST.tiles if 0 < k[0] <= 4))
-flat = s.temp("flat.gpkg")
-s.import_terrain(flat, s.write_grid(s.temp("flat.asc"), s.rough_grid(9, 9, 1)), name="flat")
-for arguments, sentence, expected in (
-        ([flat, "-o", s.temp("none")], "terrain flat has no tiles: they are of terrains in longitude and latitude on WGS 84", 1),
-        ([COAST.database], "-o FOLDER is missing", 2),
-        ([COAST.database, "-o", s.temp("none"), "--levels", "9-3"], "--levels 9-3: two levels", 2),
-        ([COAST.database, "-o", s.temp("none"), "--levels", "24"], "terrain coast has levels 0 to 12", 1),
-        ([COAST.database, "-o", s.temp("none"), "--terrain", "nowhere"], "nowhere", 1),
-        ([COAST.database, "-o", COAST.database], "Not a directory", 1)):
-    out, status = s.run([s.RQT, "tiles", *arguments])
-    s.check("rqt tiles %s: %s" % (" ".join(os.path.basename(a) for a in arguments), sentence), sentence in out and status == expected, out)
-
-# A database that somebody has edited.
-for name, edit, sentence in (("fill", "UPDATE rqt_fill_1 SET row = 100000 WHERE id = (SELECT max(id) FROM rqt_fill_1)", "terrain coast is damaged: its filled samples"),
-                             ("block", "UPDATE rqt_block_1 SET data = zeroblob(length(data))", "damaged")):
-    edited = s.temp(name + ".edited.gpkg")
-    shutil.copy(COAST.database, edited)
-    db = s.connect(edited)
-    db.execute(edit)
-    db.close()
-    folder = s.temp(name + ".edited")
-    out, status = s.run([s.RQT, "tiles", edited, "-o", folder])
-    s.check("F55_an_edited_%s_is_a_sentence_and_no_layer_json" % name, status == 1 and sentence in out and not os.path.exists(folder + "/layer.json"), out)
-
-# Places, cells and heights that are none of the Earth's: a sentence, and no folder that takes for ever.
-for name, edit, kinds, sentence in (
-        ("longitude", "x0 = 1e300", ("quantized-mesh", "3d-tiles", "terrarium"), "it has longitudes beyond two turns of the Earth"),
-        ("turn", "x0 = -773094113099.0", ("quantized-mesh", "3d-tiles", "terrarium"), "it has longitudes beyond two turns of the Earth"),
-        ("cell", "dy = dy / 1e9", ("quantized-mesh", "3d-tiles", "terrarium"), "its cells are too small or too long"),
-        ("long_cell", "dy = dy / 2000", ("quantized-mesh", "3d-tiles", "terrarium"), "its cells are too small or too long"),
-        ("height", "height_offset = 1e300", ("quantized-mesh",), "are none of the Earth's")):
-    edited = s.temp(name + ".edited.gpkg")
-    shutil.copy(COAST.database, edited)
-    db = s.connect(edited)
-    db.execute("UPDATE rqt_terrain SET " + edit)
-    db.close()
-    for kind in kinds:
-        folder = s.temp("%s.%s.edited" % (name, kind))
-        out, status = s.run(["timeout", "60", s.RQT, "tiles", edited, "-o", folder, "--kind", kind])
-        s.check("F55_an_edited_%s_is_a_sentence: %s" % (name, kind), status == 1 and sentence in out and not os.path.exists(folder), out)
-
-# A folder in which somebody has put links: nothing outside of it is written to, and no link passes for a tile.
-linked, outside = s.temp("linked"), s.temp("outside")
-with open(outside, "w", encoding="utf-8") as f:
-    f.write("mine")
-key = "%d/%d/%d.terrain" % max(COAST.tiles)
-os.makedirs(os.path.dirname(os.path.join(linked, key)))
-shutil.copy(COAST.folder + "/.rqt-tiles", linked)
-os.symlink(outside, os.path.join(linked, key + ".part"))
-other = "%d/%d/%d.terrain" % min(COAST.tiles)
-os.makedirs(os.path.dirname(os.path.join(linked, other)), exist_ok=True)
-os.symlink(outside, os.path.join(linked, other))
-s.equal("links in the folder", s.run([s.RQT, "tiles", COAST.database, "-o", linked]), ("", 0))
-with open(outside, encoding="utf-8") as f:
-    s.equal("... are not written through", f.read(), "mine")
-s.equal("... and the folder is that without them", files(linked), whole)
-os.makedirs(s.temp("claimed"))
-os.symlink(s.temp("claimed.elsewhere"), s.temp("claimed") + "/.rqt-tiles")
-out, status = s.run([s.RQT, "tiles", COAST.database, "-o", s.temp("claimed")])
-s.check("... nor made through one", status == 1 and ".rqt-tiles" in out and not os.path.exists(s.temp("claimed.elsewhere")), out)
-
-# A database with a log: SQLite makes the log anew for whoever reads, without bytes.
-logged = s.temp("logged.gpkg")
-shutil.copy(COAST.database, logged)
-db = s.connect(logged, load=False)
-db.execute("PRAGMA journal_mode = WAL")
-db.close()
-for name in ("tiles of a database with a log", "... are gone on with by the same command"):
-    s.equal(name, s.run([s.RQT, "tiles", logged, "-o", s.temp("logged")]), ("", 0))
-# What changes the file and not the terrain: other tables, the log's end, VACUUM, a copy.
-db = s.connect(logged, load=False)
-db.execute("CREATE TABLE other AS SELECT 1 AS x")
-for name, sql in (("beside another table", "SELECT 1"), ("after a checkpoint", "PRAGMA wal_checkpoint(TRUNCATE)"), ("after VACUUM", "VACUUM")):
-    db.execute(sql).fetchall()
-    s.equal("... " + name, s.run([s.RQT, "tiles", logged, "-o", s.temp("logged")]), ("", 0))
-db.close()
-shutil.copy(logged, s.temp("copied.gpkg"))
-s.equal("... by a copy", s.run([s.RQT, "tiles", s.temp("copied.gpkg"), "-o", s.temp("logged")]), ("", 0))
-for name, sql in (("row", "UPDATE rqt_terrain SET source = 'elsewhere'"), ("summary", "UPDATE rqt_block_1 SET summary = (SELECT summary FROM rqt_block_1 WHERE id > 1) WHERE id = 1"),
-                  ("block", "UPDATE rqt_block_1 SET data = (SELECT data FROM rqt_block_1 WHERE id > 1) WHERE id = 1"), ("sea", "UPDATE rqt_fill_1 SET col0 = col0 + 1 WHERE id = 1")):
-    shutil.copy(logged, s.temp("changed.gpkg"))
-    db = s.connect(s.temp("changed.gpkg"), load=False)
-    db.execute(sql)
-    db.close()
-    out, status = s.run([s.RQT, "tiles", s.temp("changed.gpkg"), "-o", s.temp("logged")])
-    s.check("... not with another " + name, status == 1 and "of another state of it" in out, out)
-db = s.connect(s.temp("changed.gpkg"), load=False)
-db.execute("UPDATE rqt_block_1 SET data = 7 WHERE id = (SELECT max(id) FROM rqt_block_1)")
-last = s.one(db, "SELECT max(id) FROM rqt_block_1")
-db.close()
-s.equal("a block that is not bytes is named", s.run([s.RQT, "tiles", s.temp("changed.gpkg"), "-o", s.temp("number")]),
-        ("rqt tiles: terrain coast is damaged: block %d\n" % last, 1))
-
-# --------------------------------------------------------------------------------------------------------- the service
-
-server = service.Service(COAST.database, flat)
-root = "/collections/coast/tiles/quantized-mesh/"
-answer = server.ask(root + "layer.json")
-s.equal("the service's layer.json is the command's", (answer.content_type, answer.body), ("application/json", whole["layer.json"]))
-s.equal("every tile that is listed is served, with the bytes of the command",
-        [key for key in listed(COAST.layer) if server.ask(root + "%d/%d/%d.terrain" % key).body != whole["%d/%d/%d.terrain" % key]], [])
-key = max(COAST.tiles)
-answer = server.ask(root + "%d/%d/%d.terrain" % key, headers={
-    "Accept": "application/vnd.quantized-mesh;extensions=octvertexnormals-watermask-metadata,application/octet-stream;q=0.9,*/*;q=0.01",
-    "Accept-Encoding": "gzip"})
-s.equal("... as clients ask for it", (answer.status, answer.content_type, answer.content_encoding, gzip.decompress(answer.body)),
-        (200, "application/vnd.quantized-mesh", "gzip", whole["%d/%d/%d.terrain" % key]))
-s.equal("... and not again when they have it", server.ask(root + "%d/%d/%d.terrain" % key, headers={"Accept-Encoding": "gzip", "If-None-Match": answer.etag}).status, 304)
-around = {(z, x + i, y + j) for z, x, y in COAST.tiles for i in (-1, 0, 1) for j in (-1, 0, 1)} - set(COAST.tiles) - set(COAST.empty)
-s.equal("tiles that are not listed are not there",
-        [t for t in sorted(around) if min(t) >= 0 and server.ask(root + "%d/%d/%d.terrain" % t).status != 404], [])
-for path in ("13/0/0.terrain", "99999999/1/0.terrain", "0/2/0.terrain", "0/1/1.terrain", "00/1/0.terrain", "0/01/0.terrain", "0/1/0", "0/1/.terrain",
-             "0/1/0.terrain.terrain", "-0/1/0.terrain", "0/1/0x.terrain", "999999999999/1/0.terrain", "0/1/0.terrain/0", "", "0"):
-    s.equal("no tile at " + path, server.ask(root + path).status, 404)
-s.equal("... but at 0/1/0.terrain", server.ask(root + "0/1/0.terrain").status, 200)
-answer = server.ask("/collections/flat/tiles/quantized-mesh/layer.json")
-s.check("a terrain without tiles says why", answer.status == 400 and "longitude and latitude on WGS 84" in answer.detail(), answer.detail())
-s.equal("the service lives", (server.is_alive(), server.ask("/healthz").status), (True, 200))
-server.process.terminate()
-s.equal("... and ends well", server.process.wait(30), 0)
-
-# A fiftieth of a second is too short to look at 900 x 900 samples without a triangle, but not for a part of them.
-bare = s.temp("bare.gpkg")
-s.import_terrain(bare, s.write_grid(s.temp("bare.asc"), [[None if (row + col) % 2 else 100 + row % 7 * col % 5 for col in range(900)] for row in range(900)], 12.3, 45.6, 1 / 1200, s.WGS84),
-                 name="bare")
-server = service.Service(bare, "--max-seconds", "0.02", "--workers", "1")
-told = []
-
-
-def is_answered():
-    told.append(server.ask("/collections/bare/tiles/quantized-mesh/layer.json"))
-    return told[-1].status != 503
-
-
-s.check("who asks again for what takes too long is answered", service.wait_until(is_answered) and told[-1].status == 200, told[-1].body[:200])
-s.check("... and was told to", any("ask again, and it goes on from here" in answer.detail() and answer.retry_after == "1" for answer in told[:-1]), [a.body[:200] for a in told[:3]])
-s.run([s.RQT, "tiles", bare, "-o", s.temp("bare")])
-s.equal("... with the same", told[-1].body, open(s.temp("bare") + "/layer.json", "rb").read())
-server.process.terminate()
-s.equal("... and the service ends well", server.process.wait(30), 0)
-
-# What closes the Earth is read along both columns, more than any tile has.
-server = service.Service(EARTH.database, "--max-triangles", "500")
-answer = server.ask("/collections/earth/tiles/quantized-mesh/layer.json")
-s.equal("limits are those of answers, not of what closes the Earth", (answer.status, answer.body), (200, files(EARTH.folder)["layer.json"]))
-server.process.terminate()
-s.equal("... and the service ends well", server.process.wait(30), 0)
 
 s.finish()

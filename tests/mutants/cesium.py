@@ -1,6 +1,6 @@
 """Mutants of the page /cesium and of what Cesium needs of the tiles: see ../mutants.py."""
 
-CESIUM, TILES, SERVE = "web/cesium.test.mjs", "test_tiles.py", "test_serve.py"
+CESIUM, TILES, FOLDER, SERVE = "web/cesium.test.mjs", "test_tiles.py", "test_tiles_folder.py", "test_serve.py"
 LAYER, ENCODE, KIND, SPECK, MESH = ("src/tiles/quantized_mesh/%s.c" % name for name in ("layer", "encode", "quantized_mesh", "speck", "mesh"))
 PYRAMID = "src/tiles/pyramid.c"
 GLOBE, TILESET = ("src/web/cesium/%s.js" % name for name in ("globe", "tileset"))
@@ -11,7 +11,7 @@ MUTANTS = [
     ("cesium: one tile of level 0", LAYER, "(tile_range){0, 1, 0, 0}", "(tile_range){0, 0, 0, 0}", TILES, "both tiles of level 0"),
     ("cesium: an empty tile is none", KIND, "(mesh.cut.triangle_count > 0 || z == 0)", "(mesh.cut.triangle_count > 0)", TILES, "listed and there are the same"),
     ("cesium: a tile tells of the other half", LAYER, "add_ranges(ranges, count, x << z, ((x + 1) << z) - 1, list);", "add_ranges(ranges, count, 0, (2 << z) - 1, list);", TILES, "each tells of those below it"),
-    ("cesium: tiles tell of levels that are not there", PYRAMID, "    tiles_tell(t, p->last);\n", "", TILES, "tell of no others than there are"),
+    ("cesium: tiles tell of levels that are not there", PYRAMID, "    tiles_tell(t, p->last);\n", "", FOLDER, "tell of no others than there are"),
     ("cesium: heights are a step too high", ENCODE, "put_float(w, (float)plan->lowest);", "put_float(w, (float)(plan->lowest + 3));", CESIUM, "africa: sampleTerrainMostDetailed"),
     # specks
     ("cesium: no specks", MESH, "        specks_add(mesh);\n", "", CESIUM, "Cesium with its checks"),

@@ -1,6 +1,6 @@
 """Mutants of the tiles: see ../mutants.py."""
 
-COMMON, TILES, MARKED = "src/tiles/tiles.c", "test_tiles.py", "cells_are_marked_where_the_mesh_has_triangles"
+COMMON, TILES, FOLDER, MARKED = "src/tiles/tiles.c", "test_tiles.py", "test_tiles_folder.py", "cells_are_marked_where_the_mesh_has_triangles"
 QUERY, CELLS = "src/store/query.c", "src/core/cells.c"
 PLAN, MESH, GLOBE, WATER, ENCODE, LAYER = ("src/tiles/quantized_mesh/%s.c" % name for name in ("plan", "mesh", "globe", "water", "encode", "layer"))
 PYRAMID, EARTH = "src/tiles/pyramid.c", "src/tiles/earth.c"
@@ -68,16 +68,16 @@ MUTANTS = [
     ("tiles: a tile that touches the raster is listed", PLAN, "return (from > 0 ? from : 0) < (to < last ? to : last);", "return (from > 0 ? from : 0) <= (to < last ? to : last) + (1 << UNIT_BITS);", TILES,
      "the same tiles"),
     # to disk
-    ("tiles: all is made again", PYRAMID, "if (lstat(path, &there) == 0 && S_ISREG(there.st_mode) && there.st_size > 0) return SQLITE_OK;", "(void)there;", TILES, "without making again"),
-    ("tiles: anybody's folder will do", PYRAMID, "if ((size_t)n == size && memcmp(there, description, size) == 0) return SQLITE_OK;", "return SQLITE_OK;", TILES, "are not mixed in"),
-    ("tiles: what nobody says anything of is ours", PYRAMID, "if (n == 0) code = check_empty(job->folder, error);", "if (n < 0) code = check_empty(job->folder, error);", TILES, "says nothing of its files"),
-    ("digest: blocks are alike", "src/store/digest.c", "if (code == SQLITE_OK) *h = mix(mix(*h, &size, sizeof size), header, (size_t)n);", "", TILES, "another block"),
-    ("digest: what is not bytes is not named", "src/store/digest.c", "if (code == SQLITE_ERROR) spoiled = number;", "", TILES, "a block that is not bytes is named"),
+    ("tiles: all is made again", PYRAMID, "if (lstat(path, &there) == 0 && S_ISREG(there.st_mode) && there.st_size > 0) return SQLITE_OK;", "(void)there;", FOLDER, "without making again"),
+    ("tiles: anybody's folder will do", PYRAMID, "if ((size_t)n == size && memcmp(there, description, size) == 0) return SQLITE_OK;", "return SQLITE_OK;", FOLDER, "are not mixed in"),
+    ("tiles: what nobody says anything of is ours", PYRAMID, "if (n == 0) code = check_empty(job->folder, error);", "if (n < 0) code = check_empty(job->folder, error);", FOLDER, "says nothing of its files"),
+    ("digest: blocks are alike", "src/store/digest.c", "if (code == SQLITE_OK) *h = mix(mix(*h, &size, sizeof size), header, (size_t)n);", "", FOLDER, "another block"),
+    ("digest: what is not bytes is not named", "src/store/digest.c", "if (code == SQLITE_ERROR) spoiled = number;", "", FOLDER, "a block that is not bytes is named"),
     ("seam: limits of answers are its own", "src/tiles/seam.c", "limits->triangles = 0;", "", TILES, "limits are those of answers"),
-    ("digest: nothing was filled", "src/store/digest.c", "store_has_fill(s->db, t))", "!s)", TILES, "another sea"),
-    ("tiles: two commands write into one folder", PYRAMID, "if (flock(*file, LOCK_EX | LOCK_NB))", "if (flock(*file, LOCK_UN))", TILES, "by one command at a time"),
+    ("digest: nothing was filled", "src/store/digest.c", "store_has_fill(s->db, t))", "!s)", FOLDER, "another sea"),
+    ("tiles: two commands write into one folder", PYRAMID, "if (flock(*file, LOCK_EX | LOCK_NB))", "if (flock(*file, LOCK_UN))", FOLDER, "by one command at a time"),
     ("tiles: gzip is not asked for", PYRAMID, "if (p->job->gzip && !series->is_packed) code = pack(&tile);", "", TILES, "all tiles are compressed"),
-    ("tiles: numbers of paths may begin with 0", "src/serve/endpoints.c", "|| (digits > 1 && *segment == '0')", "", TILES, "no tile at 00/1/0"),
-    ("tiles: what is behind a number does not matter", "src/serve/endpoints.c", "return strlen(segment + digits) == rest && memcmp(segment + digits, close + 1, rest) == 0;", "return rest + 1 > 0;", TILES,
+    ("tiles: numbers of paths may begin with 0", "src/serve/endpoints.c", "|| (digits > 1 && *segment == '0')", "", FOLDER, "no tile at 00/1/0"),
+    ("tiles: what is behind a number does not matter", "src/serve/endpoints.c", "return strlen(segment + digits) == rest && memcmp(segment + digits, close + 1, rest) == 0;", "return rest + 1 > 0;", FOLDER,
      "no tile at 0/1/0x"),
 ]
