@@ -32,6 +32,7 @@ KINDS = {"quantized-mesh": ("layer.json", {"json": "application/json", "terrain"
 CLIENTS = {"quantized-mesh": ("?extensions=octvertexnormals-metadata&v=1.0.0",
                               "application/vnd.quantized-mesh;extensions=octvertexnormals-metadata,application/octet-stream;q=0.9,*/*;q=0.01"),
            "3d-tiles": ("", "*/*"), "terrarium": ("", "image/avif,image/webp,image/png,*/*;q=0.8")}
+REFUSED, FINE, WRONG = range(3)
 
 
 def rasters(arguments):
@@ -140,13 +141,13 @@ def judge_refusal(kind, database, said):
 
 
 def judge_kind(kind, raster, database, sea):
-    """Prints its table; False when something is not as promised."""
+    """Prints its table. WRONG when something is not as promised, REFUSED when the terrain has no such tiles, and says so."""
     name, folder = os.path.basename(raster).split(".")[0], s.temp("tiles")
     shutil.rmtree(folder, ignore_errors=True)
     start = time.perf_counter()
     said, status = s.run([s.RQT, "tiles", database, "--kind", kind, "-o", folder])
-    seconds = time.perf_counter() - start
-    if status != 0:
+    seconds, was_made = time.perf_counter() - start, status == 0
+    if not was_made:
         faults = judge_refusal(kind, database, said)
         print("\n%s, %s: %s" % (name, kind, said.strip()))
     else:
@@ -163,11 +164,11 @@ def judge_kind(kind, raster, database, sea):
     for fault in faults[:5]:
         print("    " + fault)
     sys.stdout.flush()
-    return not faults
+    return WRONG if faults else FINE if was_made else REFUSED
 
 
 def judge_raster(path, kinds, sea):
-    """False when something is not as promised. None: import refuses the raster."""
+    """The worst of its kinds; REFUSED when there is none, or import refuses the raster."""
     database = s.temp("tiles.gpkg")
     if os.path.exists(database):
         os.remove(database)
@@ -175,8 +176,8 @@ def judge_raster(path, kinds, sea):
         s.import_terrain(database, path, name="t", **({} if sea is None else {"sea": sea}))
     except RuntimeError as error:
         print("%s is skipped: %s" % (os.path.basename(path), str(error).strip().splitlines()[-1]), file=sys.stderr)
-        return None
-    return all([judge_kind(kind, path, database, sea) for kind in kinds])
+        return REFUSED
+    return max(judge_kind(kind, path, database, sea) for kind in kinds)
 
 
 def main():
@@ -186,12 +187,13 @@ def main():
     if kind and kind not in KINDS:
         sys.exit("verify-tiles: KIND=%s is none of %s" % (kind, ", ".join(KINDS)))
     verdicts = {path: judge_raster(path, [kind] if kind else list(KINDS), sea) for path in rasters(sys.argv[1:] or [s.DATA])}
-    looked_at = [fine for fine in verdicts.values() if fine is not None]
-    if not looked_at:
-        sys.exit("verify-tiles: nothing could be imported")
-    print("\n%d rasters, %d not as promised%s" % (len(looked_at), looked_at.count(False), "".join(
-        ": " + os.path.basename(path) for path, fine in verdicts.items() if fine is False)))
-    sys.exit(1 if False in looked_at else 0)
+    found = {verdict: [os.path.basename(path) for path, v in verdicts.items() if v == verdict] for verdict in (REFUSED, FINE, WRONG)}
+    print("\n%d rasters judged, %d not as promised%s%s" % (
+        len(found[FINE]) + len(found[WRONG]), len(found[WRONG]), "".join(": " + name for name in found[WRONG]),
+        "; %d without tiles: %s" % (len(found[REFUSED]), ", ".join(found[REFUSED])) if found[REFUSED] else ""))
+    if len(found[REFUSED]) == len(verdicts):
+        sys.exit("verify-tiles: no raster has tiles")
+    sys.exit(1 if found[WRONG] else 0)
 
 
 if __name__ == "__main__":

@@ -115,9 +115,12 @@ static void add_extent(cJSON *collection, sqlite3_stmt *row) {
 static void add_tiles(cJSON *links, sqlite3_stmt *row, const char *name) {
     if (!sqlite3_column_int(row, LONLAT) || fabs(sqlite3_column_double(row, INVERSE_FLATTENING) - WGS84) > 1e-8)
         return;
-    for (const tile_kind *const *kind = tile_kinds; *kind; kind++)
-        add_link(links, "related", JSON, "tiles for globes and maps", "/collections/%s/tiles/%s/%s", name,
-                 (*kind)->name, (*kind)->document);
+    for (const tile_kind *const *kind = tile_kinds; *kind; kind++) {
+        char title[64];
+        snprintf(title, sizeof title, "tiles for globes and maps: %s", (*kind)->name);
+        add_link(links, "related", JSON, title, "/collections/%s/tiles/%s/%s", name, (*kind)->name,
+                 (*kind)->document);
+    }
 }
 
 static cJSON *collection_of(sqlite3_stmt *row) {

@@ -35,12 +35,29 @@ int tiles_fail_database(char **error, sqlite3 *db, int code) {
 
 #define LEAST_CELL 1e-9 /* degrees; a tenth of a millimetre */
 #define MOST_RATIO 1024.0
+
+/* What it is in, and what to do. */
+static int fail_crs(const store_terrain *t, char **error) {
+    const char *name = strchr(t->crs, '"'), *end = name ? strchr(name + 1, '"') : NULL;
+    if (!end)
+        return tiles_fail(error,
+                          "terrain %s has no tiles: they are of terrains in longitude and latitude on WGS 84, and "
+                          "its raster has no CRS (gdal_translate -a_srs EPSG:4326 gives it one)",
+                          t->name);
+    return tiles_fail(
+        error,
+        "terrain %s has no tiles: they are of terrains in longitude and latitude on WGS 84, and it is "
+        "in %.*s (gdalwarp -t_srs EPSG:4326 makes a raster that has them)",
+        t->name, (int)(end - name - 1), name + 1);
+}
+
 int tiles_check_place(const store_terrain *t, char **error) {
     const double most = 1 + 1e-9; /* a rounding */
     const geo_extent e = tiles_extent(t);
-    if (!t->lonlat || !t->wgs84 || t->placement.dx <= 0 || t->placement.dy >= 0)
-        return tiles_fail(
-            error, "terrain %s has no tiles: they are of terrains in longitude and latitude on WGS 84", t->name);
+    if (!t->lonlat || !t->wgs84) return fail_crs(t, error);
+    if (t->placement.dx <= 0 || t->placement.dy >= 0)
+        return tiles_fail(error, "terrain %s has no tiles: its rows do not go south, or its columns not east",
+                          t->name);
     /* A longitude may be told with a turn too many, and no more: doubles far out have no digits left. */
     if (fabs(e.west) > 720 || fabs(e.east) > 720)
         return tiles_fail(error, "terrain %s has no tiles: it has longitudes beyond two turns of the Earth",

@@ -28,7 +28,7 @@ const SIDE = 471;
 const SOURCE = join(ROOT, 'tests', 'data', 'N41E001.hgt.zip'), COLUMN = 700, ROW = 180, X0 = 1 + COLUMN * STEP, Y0 = 42 - ROW * STEP;
 const VIEW = {longitude: 1.83, latitude: 41.57, zoom: 12.4, pitch: 60, bearing: -10};
 
-/* What people would write: README has the same. */
+/* What people would write: the README has both. */
 async function terrainLayer({deck: {TerrainLayer}, url}) {
     const {tiles, bounds, minzoom, maxzoom} = await (await fetch(`${url}/terrarium/tile.json`)).json();
     return {layers: [new TerrainLayer({
