@@ -85,8 +85,8 @@ async function tileOf(z, x, y) {
     if (!told.has(key)) {
         const response = await fetch(`${service.url.replace(/\/$/, '')}/collections/degrees/tiles/terrarium/${key}.png`);
         assert.equal(response.status, 200, key);
-        const bytes = Buffer.from(await response.arrayBuffer()), {rgba} = decodePng(bytes);
-        const error = Number(/error_metres\0([0-9.e+-]+)/.exec(bytes.toString('latin1'))[1]);
+        const {rgba, texts} = decodePng(Buffer.from(await response.arrayBuffer()));
+        const error = Number(texts.error_metres);
         const height = (i, j) => rgba[4 * (256 * j + i)] * 256 + rgba[4 * (256 * j + i) + 1] + rgba[4 * (256 * j + i) + 2] / 256 - 32768;
         told.set(key, {height, error});
     }

@@ -1,13 +1,16 @@
 // picture.mjs - pictures as the tests read them: PNG to pixels, and where the background shows through a terrain.
 import {inflateSync} from 'node:zlib';
 
-/** Pixels of a PNG that Chromium wrote (8 bits, RGB or RGBA, not interlaced): {width, height, rgba}. */
+/** Pixels of a PNG (8 bits, RGB or RGBA, not interlaced), and its texts (tEXt) by their keywords: {width, height, rgba, texts}. */
 export function decodePng(file) {
     const width = file.readUInt32BE(16), height = file.readUInt32BE(20), channels = file[25] === 6 ? 4 : 3;
     if (file[24] !== 8 || (file[25] !== 2 && file[25] !== 6) || file[28] !== 0) throw new Error('a PNG of another kind');
-    const parts = [];
-    for (let at = 8; at < file.length; at += 12 + file.readUInt32BE(at))
-        if (file.toString('latin1', at + 4, at + 8) === 'IDAT') parts.push(file.subarray(at + 8, at + 8 + file.readUInt32BE(at)));
+    const parts = [], texts = {};
+    for (let at = 8; at < file.length; at += 12 + file.readUInt32BE(at)) {
+        const kind = file.toString('latin1', at + 4, at + 8), data = file.subarray(at + 8, at + 8 + file.readUInt32BE(at));
+        if (kind === 'IDAT') parts.push(data);
+        if (kind === 'tEXt') texts[data.toString('latin1', 0, data.indexOf(0))] = data.toString('latin1', data.indexOf(0) + 1);
+    }
     const raw = inflateSync(Buffer.concat(parts)), stride = width * channels;
     const rgba = new Uint8ClampedArray(4 * width * height).fill(255);
     let before = new Uint8Array(stride), line = new Uint8Array(stride);
@@ -26,7 +29,7 @@ export function decodePng(file) {
             for (let c = 0; c < channels; c++) rgba[4 * (y * width + x) + c] = line[x * channels + c];
         [before, line] = [line, before];
     }
-    return {width, height, rgba};
+    return {width, height, rgba, texts};
 }
 
 /** How many pixels of two pictures differ. */
