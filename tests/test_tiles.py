@@ -356,6 +356,14 @@ for row in range(1150):
 TALL = pyramid("tall", s.write_grid(s.temp("tall.asc"), tall, 30.01, 44.02, 1 / 1200, s.WGS84), tall, block=3)
 s.equal("tall: layer.json lists the same tiles", sorted(listed(TALL.layer)), sorted([*TALL.tiles, *TALL.empty]))
 listed_exactly(TALL, False)
+# ... and as wide as more of them.
+wide = s.rough_grid(1150, 70, 6, relief=40)
+for row in range(70):
+    for col in range(1150):
+        if col % 200 > 90 + row or (row - 30) ** 2 + (col - 480) ** 2 < 60:
+            wide[row][col] = None
+WIDE = pyramid("wide", s.write_grid(s.temp("wide.asc"), wide, 30.01, 44.02, 1 / 1200, s.WGS84), wide, block=3)
+listed_exactly(WIDE, False)
 
 # Longitudes beyond 180: the same places by another name.
 hill = s.rough_grid(90, 70, 11, relief=500)
