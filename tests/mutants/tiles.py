@@ -44,7 +44,7 @@ MUTANTS = [
     # which there are
     ("tiles: rows of layer.json begin one further north", LAYER, 'cJSON_AddNumberToObject(range, "startY", ranges[i].y0);', 'cJSON_AddNumberToObject(range, "startY", ranges[i].y0 + 1);', TILES, "the same tiles"),
     ("rules: all ranks of a block go down by one threshold", "src/core/rule_choose.c", "return c->by_rank[rank];", "return c->by_rank[0];", "test_core_rule", "eps_lowered_by_rank_alone_is_its_definition"),
-    ("tiles: tiles of voids are listed", CELLS, "return flags[a] & flags[l] & flags[r] & RQT_VALID;", "return true;", TILES, "the same tiles"),
+    ("marks: leaves with a void corner are kept", CELLS, "return flags[a] & flags[l] & flags[r] & RQT_VALID;", "return true;", "test_store_mark", MARKED),
     ("tiles: squares are a column short", LAYER, "s->x + SQUARE - 1, s->y", "s->x + SQUARE - 2, s->y", TILES, "no others"),
     ("tiles: bands are a row short", LAYER, "s->y + rows_of(s) - 1}", "s->y + rows_of(s) - 1 - (rows_of(s) == SQUARE)}", TILES, "no others"),
     ("marks: blocks with voids cover all", QUERY, ".all = !header.has_voids && !header.all_void", ".all = !header.all_void", "test_store_mark", MARKED),
