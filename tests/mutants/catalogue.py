@@ -55,8 +55,11 @@ MUTANTS = [
      "            block->outline |= outline;\n", "            (void)outline;\n", "test_failures_blocks", "F17_void_blocks_and_checkerboards_of_voids_keep_the_exact_outline"),
     ("F17: an index with a hole is as good as a whole one", "src/store/query.c", "if (covered == wanted) return SQLITE_OK;",
      "return SQLITE_OK;", "test_sql_failures.py", "F17_a_missing_block_is_an_error_and_never_a_hole"),
-    ("F18: an apex is not asked for data", "src/core/walk.c", "if (!(a->flags & b->flags & c->flags & RQT_VALID)) return false;",
+    ("F16: an apex past the raster is not asked for data", "src/core/walk.c", "if (!(a->flags & b->flags & c->flags & RQT_VALID)) return false;",
      "if (!((a->flags | b->flags | c->flags) & RQT_VALID)) return false;",
+     "test_failures_blocks", "F16_voids_at_block_corners_centres_and_borders_keep_the_exact_outline"),
+    ("F18: an apex is not asked for data", "src/core/walk.c", "if (flags[h.a] & flags[h.l] & flags[h.r] & RQT_VALID) {",
+     "if ((flags[h.a] | flags[h.l] | flags[h.r]) & RQT_VALID) {",
      "test_failures_blocks", "F18_single_valid_samples_and_strips_have_no_triangle"),
     # blocks
     ("F21: a block's last column forgets outlines", "src/core/pyramid.c",
