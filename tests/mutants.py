@@ -6,6 +6,8 @@ program, test): the first occurrence of the text is replaced in a copy of the tr
 mutant is caught when it fails and names that test (or hangs). The program is one of build/tests, or a script tests/*.py or
 tests/web/*.test.mjs, which runs with the mutant's command and extension. A text that is not found is a failure too: the list has to follow the code.
 
+RQT_MUTANTS_SECONDS: no mutant is begun after so long; how many were left out is said. For where there is a limit of time.
+
 As many workers as there are processors, each with a copy of the tree; mutants of one program follow each other in one of them,
 whose objects are then mostly up to date. What was missed is said again at the end.
 """
@@ -130,12 +132,16 @@ def main():
         tree = os.path.join(folder, str(i))
         copy_tree(build, tree)
         trees.put(tree)
-    missed = []
+    missed, left_out = [], []
+    end = time.monotonic() + float(os.environ.get("RQT_MUTANTS_SECONDS", "inf"))
 
     def run_group(group):
         tree = trees.get()
         for mutant in group:
             begun = time.monotonic()
+            if begun > end:
+                left_out.append(mutant)
+                continue
             verdict = run_mutant(tree, mutant)
             if verdict:
                 missed.append("MISSED  %-48s %s" % (mutant[0], verdict))
@@ -147,7 +153,9 @@ def main():
         total = sum(workers.map(run_group, groups.values()))
     for line in missed:
         print(line)
-    print("%d passed, %d failed" % (total - len(missed), len(missed)))
+    if left_out:
+        print("time is up: %d of %d mutants were not looked at" % (len(left_out), total))
+    print("%d passed, %d failed" % (total - len(missed) - len(left_out), len(missed)))
     return bool(missed)
 
 
